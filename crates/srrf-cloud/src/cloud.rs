@@ -1,0 +1,170 @@
+//! [`PointCloud`]: a checked list of points.
+
+use nalgebra::Vector3;
+
+use crate::Rigid;
+
+/// Why a list of points is not a usable cloud.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CloudError {
+    /// There are no points.
+    #[error("the cloud is empty")]
+    Empty,
+    /// A coordinate is NaN or infinite.
+    #[error("point {index} has a coordinate that is not finite: {point:?}")]
+    NotFinite {
+        /// Index of the first such point.
+        index: usize,
+        /// Its coordinates.
+        point: [f64; 3],
+    },
+    /// Too few points for what was asked.
+    #[error("the cloud has {have} points, at least {need} are needed")]
+    TooFew {
+        /// Number of points there are.
+        have: usize,
+        /// Number of points needed.
+        need: usize,
+    },
+    /// All points lie on one line (or coincide), so that no rotation can be found.
+    #[error("the points lie on one line (or coincide): a rotation cannot be determined from them")]
+    Collinear,
+}
+
+/// A non-empty cloud of finite points, in the unit of its source.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointCloud {
+    points: Vec<[f64; 3]>,
+}
+
+impl PointCloud {
+    /// Checks `points` (shape `[n, 3]`) and takes them.
+    ///
+    /// # Errors
+    /// [`CloudError::Empty`] without points, [`CloudError::NotFinite`] at the first NaN or infinity.
+    pub fn new(points: Vec<[f64; 3]>) -> Result<Self, CloudError> {
+        if points.is_empty() {
+            return Err(CloudError::Empty);
+        }
+        match points.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+            Some(index) => Err(CloudError::NotFinite { index, point: points[index] }),
+            None => Ok(Self { points }),
+        }
+    }
+
+    /// The points, shape `[n, 3]`.
+    pub fn points(&self) -> &[[f64; 3]] {
+        &self.points
+    }
+
+    /// The points, moved out.
+    pub fn into_points(self) -> Vec<[f64; 3]> {
+        self.points
+    }
+
+    /// Number of points, at least 1.
+    #[allow(clippy::len_without_is_empty, reason = "a cloud is never empty")]
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Mean of the points.
+    pub fn centroid(&self) -> Vector3<f64> {
+        self.points.iter().map(|p| Vector3::from(*p)).sum::<Vector3<f64>>() / self.len() as f64
+    }
+
+    /// The cloud moved by `pose`: each point `p` becomes `R p + t`.
+    pub fn transformed(&self, pose: &Rigid) -> Self {
+        Self { points: self.points.iter().map(|p| pose.apply(p)).collect() }
+    }
+
+    /// Checks that a rotation can be found from this cloud: 3 points or more, not all on one line.
+    ///
+    /// A cloud counts as a line when the second singular value of its centred points is under
+    /// `1e-6` of the first.
+    ///
+    /// # Errors
+    /// [`CloudError::TooFew`] or [`CloudError::Collinear`].
+    pub fn check_rotation_observable(&self) -> Result<(), CloudError> {
+        if self.len() < 3 {
+            return Err(CloudError::TooFew { have: self.len(), need: 3 });
+        }
+        let mean = self.centroid();
+        let scatter = self.points.iter().fold(nalgebra::Matrix3::zeros(), |acc, p| {
+            let d = Vector3::from(*p) - mean;
+            acc + d * d.transpose()
+        });
+        let mut eigen: Vec<f64> = scatter.symmetric_eigenvalues().iter().copied().collect();
+        eigen.sort_by(f64::total_cmp);
+        // Eigenvalues are squared singular values.
+        if eigen[1] <= 1e-12 * eigen[2] || eigen[2] == 0.0 { Err(CloudError::Collinear) } else { Ok(()) }
+    }
+
+    /// The cloud centred on its mean and scaled so that its farthest point has norm 1, with what
+    /// is needed to undo it.
+    ///
+    /// A cloud of coinciding points is centred and keeps scale 1.
+    pub fn to_unit_sphere(&self) -> (Self, UnitSphere) {
+        let centre = self.centroid();
+        let radius = self.points.iter().map(|p| (Vector3::from(*p) - centre).norm()).fold(0.0, f64::max);
+        let frame = UnitSphere { centre, radius: if radius > 0.0 { radius } else { 1.0 } };
+        (Self { points: self.points.iter().map(|p| frame.apply(p)).collect() }, frame)
+    }
+}
+
+/// The frame in which a cloud is centred on its mean and has radius 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UnitSphere {
+    /// Mean of the original points, original unit.
+    pub centre: Vector3<f64>,
+    /// Distance of the farthest original point from the mean, original unit; never 0.
+    pub radius: f64,
+}
+
+impl UnitSphere {
+    /// Original coordinates to unit-sphere coordinates.
+    pub fn apply(&self, point: &[f64; 3]) -> [f64; 3] {
+        ((Vector3::from(*point) - self.centre) / self.radius).into()
+    }
+
+    /// Unit-sphere coordinates back to original coordinates.
+    pub fn undo(&self, point: &[f64; 3]) -> [f64; 3] {
+        (Vector3::from(*point) * self.radius + self.centre).into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn refuses_what_is_not_a_cloud() {
+        assert_eq!(PointCloud::new(vec![]), Err(CloudError::Empty));
+        let bad = PointCloud::new(vec![[0.0; 3], [0.0, f64::NAN, 1.0]]);
+        assert!(matches!(bad, Err(CloudError::NotFinite { index: 1, .. })));
+    }
+
+    #[test]
+    fn finds_lines() {
+        let cloud = |points: Vec<[f64; 3]>| PointCloud::new(points).unwrap().check_rotation_observable();
+        assert_eq!(cloud(vec![[0.0; 3], [1.0, 0.0, 0.0]]), Err(CloudError::TooFew { have: 2, need: 3 }));
+        let line = (0..7).map(|i| [1e6 + i as f64, 2.0 * i as f64, -i as f64]).collect();
+        assert_eq!(cloud(line), Err(CloudError::Collinear));
+        assert_eq!(cloud(vec![[2.0; 3]; 5]), Err(CloudError::Collinear));
+        assert_eq!(cloud(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), Ok(()));
+    }
+
+    #[test]
+    fn unit_sphere_is_undone() {
+        let cloud =
+            PointCloud::new(vec![[500_000.0, 2.0, 3.0], [500_004.0, 2.5, 9.0], [500_001.0, -7.0, 3.0]])
+                .unwrap();
+        let (unit, frame) = cloud.to_unit_sphere();
+        let largest = unit.points().iter().map(|p| Vector3::from(*p).norm()).fold(0.0, f64::max);
+        assert!((largest - 1.0).abs() < 1e-12);
+        for (p, q) in cloud.points().iter().zip(unit.points()) {
+            let back = frame.undo(q);
+            assert!((0..3).all(|c| (back[c] - p[c]).abs() < 1e-9));
+        }
+    }
+}

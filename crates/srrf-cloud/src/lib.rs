@@ -1,0 +1,16 @@
+//! The ground floor of SRRF: point clouds, rigid poses, neighbours, data sources, and the seam
+//! [`Register`] that every registration method implements. No tensors live here.
+//!
+//! Coordinates are `f64` throughout, in the unit of the input. Poses carry their frames in their
+//! names: `target_from_source` maps source coordinates into the target frame,
+//! `target ~ R source + t`.
+
+mod cloud;
+mod euler;
+mod register;
+mod rigid;
+
+pub use cloud::{CloudError, PointCloud, UnitSphere};
+pub use euler::EulerXyz;
+pub use register::{Branch, Register, RegisterError, Registration};
+pub use rigid::Rigid;

@@ -1,0 +1,69 @@
+//! The seam that every registration method implements.
+
+use crate::{CloudError, PointCloud, Rigid};
+
+/// Why two clouds could not be registered.
+#[derive(Debug, thiserror::Error)]
+pub enum RegisterError {
+    /// The source cloud cannot be used.
+    #[error("source: {0}")]
+    Source(#[source] CloudError),
+    /// The target cloud cannot be used.
+    #[error("target: {0}")]
+    Target(#[source] CloudError),
+    /// The method ran and found no pose.
+    #[error("no pose found: {0}")]
+    NoPose(String),
+}
+
+/// One of several poses that a method finds on its way to its answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Branch {
+    /// Suffix of the method's name under which this pose is scored, such as `dense`.
+    pub name: &'static str,
+    /// The pose of this branch.
+    pub target_from_source: Rigid,
+    /// Share of the branch's correspondences that agree with its pose, in [0, 1].
+    pub inlier_ratio: f64,
+}
+
+/// What a method answers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Registration {
+    /// The pose: `target ~ R source + t`.
+    pub target_from_source: Rigid,
+    /// Whether the method's own stopping rule was met; methods without one say `true`.
+    pub converged: bool,
+    /// Iterations used; 1 for methods that do not iterate.
+    pub iterations: usize,
+    /// Poses found on the way, each scored as a row of its own.
+    pub branches: Vec<Branch>,
+}
+
+impl Registration {
+    /// An answer without branches from a method that does not iterate.
+    pub fn from_pose(target_from_source: Rigid) -> Self {
+        Self { target_from_source, converged: true, iterations: 1, branches: Vec::new() }
+    }
+}
+
+/// A registration method: two clouds in, one pose out. Same input, same answer.
+pub trait Register: Send + Sync {
+    /// The name in tables, in lower case, such as `icp`.
+    fn name(&self) -> &str;
+
+    /// Finds the pose that maps `source` onto `target`.
+    ///
+    /// # Errors
+    /// [`RegisterError`] when a cloud cannot be used or no pose is found.
+    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError>;
+
+    /// Registers many pairs. Answers come in the order of the pairs, and equal those of
+    /// [`Register::register`] one by one; methods that gain from batches override this.
+    fn register_batch(
+        &self,
+        pairs: &[(&PointCloud, &PointCloud)],
+    ) -> Vec<Result<Registration, RegisterError>> {
+        pairs.iter().map(|(source, target)| self.register(source, target)).collect()
+    }
+}
