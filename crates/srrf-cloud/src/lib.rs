@@ -7,10 +7,16 @@
 
 mod cloud;
 mod euler;
+mod fps;
+mod neighbours;
+mod normals;
 mod register;
 mod rigid;
 
 pub use cloud::{CloudError, PointCloud, UnitSphere};
 pub use euler::EulerXyz;
+pub use fps::farthest_point_sampling;
+pub use neighbours::KnnIndex;
+pub use normals::estimate_normals;
 pub use register::{Branch, Register, RegisterError, Registration};
 pub use rigid::Rigid;

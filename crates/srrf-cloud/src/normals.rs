@@ -1,0 +1,102 @@
+//! Surface normals by principal component analysis of neighbourhoods.
+
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+use crate::{CloudError, KnnIndex};
+
+/// A unit normal for each of `points` (shape `[n, 3]` in and out): the direction in which its `k`
+/// nearest points, itself among them, vary least.
+///
+/// A neighbourhood has no inside, so the sign is a convention: normals point away from the mean of
+/// the cloud. Rotating the cloud rotates the normals. Where the neighbours lie on one line the
+/// normal is one of the directions across it. `k` is raised to 3 and lowered to `n`.
+///
+/// Source: Hoppe et al., "Surface reconstruction from unorganized points", 1992, section 3.1.
+///
+/// # Errors
+/// [`CloudError::TooFew`] under 3 points, [`CloudError::NotFinite`] at the first NaN or infinity.
+pub fn estimate_normals(points: &[[f64; 3]], k: usize) -> Result<Vec<[f64; 3]>, CloudError> {
+    if points.len() < 3 {
+        return Err(CloudError::TooFew { have: points.len(), need: 3 });
+    }
+    let index = KnnIndex::new(points)?;
+    let mean = mean_of(points.iter());
+    Ok(points
+        .par_iter()
+        .map(|point| {
+            let neighbours = index.k_nearest(point, k.max(3));
+            let normal = least_direction(neighbours.iter().map(|&(i, _)| &points[i]));
+            let outward = normal.dot(&(Vector3::from(*point) - mean)) >= 0.0;
+            (if outward { normal } else { -normal }).into()
+        })
+        .collect())
+}
+
+fn mean_of<'a>(points: impl ExactSizeIterator<Item = &'a [f64; 3]>) -> Vector3<f64> {
+    let count = points.len() as f64;
+    points.map(|p| Vector3::from(*p)).sum::<Vector3<f64>>() / count
+}
+
+/// Unit eigenvector of the smallest eigenvalue of the covariance.
+fn least_direction<'a>(points: impl ExactSizeIterator<Item = &'a [f64; 3]> + Clone) -> Vector3<f64> {
+    let mean = mean_of(points.clone());
+    let scatter = points.fold(Matrix3::zeros(), |sum, p| {
+        let d = Vector3::from(*p) - mean;
+        sum + d * d.transpose()
+    });
+    let eigen = scatter.symmetric_eigen();
+    eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::EulerXyz;
+
+    fn sphere() -> Vec<[f64; 3]> {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        (0..901)
+            .map(|_| {
+                let p = Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0f64));
+                p.normalize().into()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn normals_of_a_sphere_point_outwards() {
+        let points = sphere();
+        for (normal, point) in estimate_normals(&points, 15).unwrap().iter().zip(&points) {
+            let cosine = Vector3::from(*normal).dot(&Vector3::from(*point));
+            assert!(cosine > 0.97, "{cosine}");
+        }
+    }
+
+    #[test]
+    fn normals_turn_with_the_cloud() {
+        let points: Vec<[f64; 3]> = sphere().iter().map(|p| [p[0], 0.5 * p[1], 2.0 * p[2]]).collect();
+        let rotation = EulerXyz::from_deg([20.0, -50.0, 110.0]).to_matrix();
+        let turn = |p: &[f64; 3]| -> [f64; 3] { (rotation * Vector3::from(*p)).into() };
+        let turned: Vec<_> = points.iter().map(turn).collect();
+        let (before, after) =
+            (estimate_normals(&points, 12).unwrap(), estimate_normals(&turned, 12).unwrap());
+        for (b, a) in before.iter().zip(&after) {
+            assert!(Vector3::from(turn(b)).dot(&Vector3::from(*a)) > 1.0 - 1e-6);
+        }
+    }
+
+    #[test]
+    fn degenerate_clouds() {
+        assert_eq!(estimate_normals(&[[0.0; 3]; 2], 5), Err(CloudError::TooFew { have: 2, need: 3 }));
+        let line: Vec<[f64; 3]> = (0..20).map(|i| [0.0, i as f64, 0.0]).collect();
+        for normal in estimate_normals(&line, 0).unwrap() {
+            let n = Vector3::from(normal);
+            assert!((n.norm() - 1.0).abs() < 1e-9 && n.y.abs() < 1e-9);
+        }
+        assert!(estimate_normals(&[[1.0; 3]; 50], 9).unwrap().iter().flatten().all(|c| c.is_finite()));
+    }
+}
