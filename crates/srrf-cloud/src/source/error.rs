@@ -1,0 +1,78 @@
+//! Why a source of shapes cannot be opened or sampled.
+
+use std::path::{Path, PathBuf};
+
+use crate::CloudError;
+
+/// The layouts that [`crate::source::open`] accepts, for messages.
+pub const ACCEPTED_LAYOUTS: &str = "accepted layouts: \
+     ModelNet40 as HDF5 (ply_data_train0.h5, ... and shape_names.txt; 1,024 or 2,048 points), or one such .h5 file";
+
+/// Why a source of shapes cannot be opened or sampled.
+#[derive(Debug, thiserror::Error)]
+pub enum SourceError {
+    /// Nothing usable at the path.
+    #[error("no shapes found at {path:?}: {looked}; {ACCEPTED_LAYOUTS}")]
+    NotFound {
+        /// The path that was given.
+        path: PathBuf,
+        /// What was looked for, and where.
+        looked: String,
+    },
+    /// A file or folder cannot be read.
+    #[error("cannot read {path:?}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A file is not HDF5, or is damaged.
+    #[error("{path:?} is truncated, damaged or not HDF5; fetch it again: {source}")]
+    Hdf5 {
+        /// The file.
+        path: PathBuf,
+        /// The reader's reason.
+        source: Box<hdf5_pure::Error>,
+    },
+    /// A file is readable, but its content is not what the layout calls for.
+    #[error("{path:?}: {problem}")]
+    Layout {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what is expected.
+        problem: String,
+    },
+    /// A shape is not a usable cloud.
+    #[error("{path:?}, shape {shape}: {source}")]
+    Shape {
+        /// The file or folder.
+        path: PathBuf,
+        /// Number or name of the shape in it.
+        shape: String,
+        /// What is wrong with it.
+        source: CloudError,
+    },
+    /// There is no shape of that number.
+    #[error("shape {index} was asked for, but there are only {len}")]
+    NoSuchShape {
+        /// The number asked for.
+        index: usize,
+        /// How many shapes there are.
+        len: usize,
+    },
+}
+
+impl SourceError {
+    pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
+        Self::Io { path: path.to_owned(), source }
+    }
+
+    pub(crate) fn hdf5(path: &Path, source: hdf5_pure::Error) -> Self {
+        Self::Hdf5 { path: path.to_owned(), source: Box::new(source) }
+    }
+
+    pub(crate) fn layout(path: &Path, problem: impl Into<String>) -> Self {
+        Self::Layout { path: path.to_owned(), problem: problem.into() }
+    }
+}
