@@ -1,8 +1,7 @@
 //! Iterative closest point (Besl and McKay 1992), point to point.
 
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use serde::{Deserialize, Serialize};
-use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid};
+use srrf_cloud::{KnnIndex, PointCloud, Register, RegisterError, Registration, Rigid};
 
 /// Settings of [`Icp`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -54,8 +53,7 @@ impl Register for Icp {
     fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
         source.check_rotation_observable().map_err(RegisterError::Source)?;
         target.check_rotation_observable().map_err(RegisterError::Target)?;
-        let tree = ImmutableKdTree::<f64, 3>::new_from_slice(target.points())
-            .map_err(|e| RegisterError::NoPose(format!("no k-d tree of the target: {e}")))?;
+        let neighbours = KnnIndex::new(target.points()).map_err(RegisterError::Target)?;
         let limit = self.config.max_distance.map_or(f64::INFINITY, |d| d * d);
         let step_limit = self.config.tolerance * rms_radius(target);
 
@@ -69,10 +67,10 @@ impl Register for Icp {
             matched_source.clear();
             matched_target.clear();
             for point in source.points() {
-                let nearest = tree.query(&pose.apply(point)).nearest_one::<SquaredEuclidean<f64>>().execute();
-                if nearest.distance <= limit {
+                let (nearest, squared_distance) = neighbours.nearest(&pose.apply(point));
+                if squared_distance <= limit {
                     matched_source.push(*point);
-                    matched_target.push(target.points()[nearest.item as usize]);
+                    matched_target.push(target.points()[nearest]);
                 }
             }
             let next = Rigid::fit(&matched_source, &matched_target, None).ok_or_else(|| {
