@@ -1,0 +1,77 @@
+//! Clusters: the nearest points of a random point, as all corruptions of density use them.
+
+use rand::{Rng, RngExt};
+
+use crate::parameters::REFERENCE_POINTS;
+
+/// A count that is stated for 1,024 points, in proportion to `points`; at least 1.
+pub(super) fn scaled(count: usize, points: usize) -> usize {
+    ((count * points + REFERENCE_POINTS / 2) / REFERENCE_POINTS).max(1)
+}
+
+/// Draws a centre uniformly from `pool` (indices into `points`) and moves its `size` nearest
+/// members, the centre included, out of the pool. Both lists keep their order; a smaller pool is
+/// emptied. Distances are Euclidean; equal ones are decided by the index.
+pub(super) fn take<R: Rng>(points: &[[f64; 3]], pool: &mut Vec<u32>, size: usize, rng: &mut R) -> Vec<u32> {
+    if pool.is_empty() || size == 0 {
+        return Vec::new();
+    }
+    let centre = points[pool[rng.random_range(0..pool.len())] as usize];
+    if size >= pool.len() {
+        return std::mem::take(pool);
+    }
+    let key = |index: u32| -> (f64, u32) {
+        let p = &points[index as usize];
+        ((0..3).map(|c| (p[c] - centre[c]).powi(2)).sum(), index)
+    };
+    let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    let mut keys: Vec<(f64, u32)> = pool.iter().map(|&index| key(index)).collect();
+    let farthest = *keys.select_nth_unstable_by(size - 1, order).1;
+    let (near, far) = pool.iter().partition(|&&index| order(&key(index), &farthest).is_le());
+    *pool = far;
+    near
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+
+    #[test]
+    fn counts_follow_the_cloud() {
+        assert_eq!([scaled(100, 1024), scaled(30, 1024), scaled(100, 512), scaled(30, 32)], [100, 30, 50, 1]);
+        assert_eq!(scaled(75, 3), 1);
+    }
+
+    #[test]
+    fn takes_the_nearest_of_those_that_are_left() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let points: Vec<[f64; 3]> = (0..57).map(|_| std::array::from_fn(|_| rng.random())).collect();
+        let mut pool: Vec<u32> = (0..57).filter(|i| i % 5 != 0).collect();
+        let before = pool.clone();
+        let taken = take(&points, &mut pool, 11, &mut rng);
+        assert_eq!(taken.len(), 11);
+        let mut all = [taken.clone(), pool.clone()].concat();
+        all.sort_unstable();
+        assert_eq!(all, before);
+        let distance = |a: u32, b: u32| {
+            (0..3).map(|c| (points[a as usize][c] - points[b as usize][c]).powi(2)).sum::<f64>()
+        };
+        // One of the taken is the centre: all others taken are nearer to it than all others left.
+        assert!(taken.iter().any(|&centre| {
+            let reach = taken.iter().map(|&i| distance(centre, i)).fold(0.0, f64::max);
+            pool.iter().all(|&i| distance(centre, i) >= reach)
+        }));
+    }
+
+    #[test]
+    fn a_small_pool_is_emptied() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut pool = vec![0, 1, 2];
+        assert_eq!(take(&[[0.0; 3]; 3], &mut pool, 7, &mut rng), [0, 1, 2]);
+        assert!(take(&[[0.0; 3]; 3], &mut pool, 7, &mut rng).is_empty());
+        // Coinciding points: exactly as many as asked for are taken.
+        let mut pool: Vec<u32> = (0..9).collect();
+        assert_eq!(take(&[[0.0; 3]; 9], &mut pool, 4, &mut rng).len(), 4);
+    }
+}

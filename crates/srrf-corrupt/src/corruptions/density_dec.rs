@@ -1,0 +1,76 @@
+//! `density_dec`: some regions lose most of their points.
+
+use rand::rngs::ChaCha8Rng;
+
+use super::{
+    clusters::{scaled, take},
+    draws::distinct,
+};
+use crate::corruption::check;
+use crate::parameters::{DENSITY_CLUSTER_POINTS, DENSITY_CLUSTERS, DENSITY_DEC_DELETED, DENSITY_MIN_POINTS};
+use crate::{CorruptError, Corrupted, Corruption, Severity};
+
+/// A random three quarters of each cluster are deleted. The quarter that is left may be part of
+/// the next cluster. 1,024 points become 949, 874, 799, 724, 649.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DensityDec;
+
+impl Corruption for DensityDec {
+    fn name(&self) -> &'static str {
+        "density_dec"
+    }
+
+    fn apply(
+        &self,
+        points: &[[f64; 3]],
+        severity: Severity,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Corrupted, CorruptError> {
+        check(points, self.name(), DENSITY_MIN_POINTS)?;
+        let size = scaled(DENSITY_CLUSTER_POINTS, points.len());
+        let deleted = scaled(DENSITY_DEC_DELETED, points.len());
+        let mut pool: Vec<u32> = (0..points.len() as u32).collect();
+        for _ in 0..severity.of(&DENSITY_CLUSTERS) {
+            let cluster = take(points, &mut pool, size, rng);
+            let survivors = cluster.len().saturating_sub(deleted);
+            pool.extend(distinct(cluster.len(), survivors, rng).into_iter().map(|i| cluster[i]));
+        }
+        pool.sort_unstable();
+        Ok(Corrupted::subset(points, &pool))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::corruptions::testing::{cloud, rng};
+
+    #[test]
+    fn counts_and_locality() {
+        let points = cloud(1024);
+        for (severity, count) in Severity::ALL.into_iter().zip([949, 874, 799, 724, 649]) {
+            let out = DensityDec.apply(&points, severity, &mut rng(5)).unwrap();
+            assert_eq!(out.points.len(), count);
+            assert!(out.points.iter().zip(&out.origin).all(|(p, o)| *p == points[o.unwrap() as usize]));
+        }
+        let out = DensityDec.apply(&points, Severity::ALL[0], &mut rng(5)).unwrap();
+        let gone: Vec<_> =
+            (0..1024u32).filter(|i| !out.origin.contains(&Some(*i))).map(|i| points[i as usize]).collect();
+        // The 75 deleted points are among the 100 nearest of one of the points.
+        assert!(points.iter().any(|centre| {
+            let mut by_distance = points.clone();
+            by_distance.sort_by(|a, b| {
+                let d = |p: &[f64; 3]| (0..3).map(|c| (p[c] - centre[c]).powi(2)).sum::<f64>();
+                d(a).total_cmp(&d(b))
+            });
+            gone.iter().all(|p| by_distance[..100].contains(p))
+        }));
+    }
+
+    #[test]
+    fn too_few_points_are_refused() {
+        let error = DensityDec.apply(&cloud(31), Severity::ALL[4], &mut rng(5)).unwrap_err();
+        assert_eq!(error, CorruptError::TooFew { corruption: "density_dec", have: 31, need: 32 });
+        assert!(!DensityDec.apply(&cloud(32), Severity::ALL[4], &mut rng(5)).unwrap().points.is_empty());
+    }
+}

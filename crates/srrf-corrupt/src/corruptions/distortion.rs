@@ -1,0 +1,100 @@
+//! `distortion`: free-form deformation (Sederberg and Parry 1986).
+
+use rand::{Rng, rngs::ChaCha8Rng};
+
+use super::draws::in_cube;
+use crate::corruption::check;
+use crate::parameters::{CONTROL_POINTS, CONTROL_POINTS_PER_AXIS, DISTORTION_AMPLITUDE, DISTORTION_BOX_SIDE};
+use crate::{CorruptError, Corrupted, Corruption, Severity};
+
+/// A cloud bends as if it were embedded in rubber: all control points of a 5 x 5 x 5 lattice on
+/// `[-1, 1]^3` are displaced, and the points follow by Bernstein polynomials of degree 4.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Distortion;
+
+/// Displacements of the lattice's control points, in units of the box side. The control point at
+/// step `(i, j, k)` along x, y, z has index `(5 i + j) 5 + k`.
+pub type Displacements = [[f64; 3]; CONTROL_POINTS];
+
+impl Corruption for Distortion {
+    fn name(&self) -> &'static str {
+        "distortion"
+    }
+
+    fn apply(
+        &self,
+        points: &[[f64; 3]],
+        severity: Severity,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Corrupted, CorruptError> {
+        check(points, self.name(), 1)?;
+        let displacements = draw_displacements(severity, rng);
+        Ok(Corrupted::moved(points.iter().map(|p| deform(p, &displacements)).collect()))
+    }
+}
+
+/// Uniform displacements on every coordinate of every control point.
+pub fn draw_displacements<R: Rng>(severity: Severity, rng: &mut R) -> Displacements {
+    std::array::from_fn(|_| in_cube(severity.of(&DISTORTION_AMPLITUDE), rng))
+}
+
+/// The deformed point `p + side * sum_ijk B_i(u_x) B_j(u_y) B_k(u_z) mu_ijk` with
+/// `u = (p + 1) / 2`. Points outside the box `[-1, 1]^3` stay where they are.
+pub fn deform(point: &[f64; 3], displacements: &Displacements) -> [f64; 3] {
+    let u = point.map(|c| (c + 1.0) / DISTORTION_BOX_SIDE);
+    if u.iter().any(|c| !(0.0..=1.0).contains(c)) {
+        return *point;
+    }
+    let [bx, by, bz] = u.map(bernstein);
+    let mut moved = *point;
+    for (i, x) in bx.iter().enumerate() {
+        for (j, y) in by.iter().enumerate() {
+            let row = (CONTROL_POINTS_PER_AXIS * i + j) * CONTROL_POINTS_PER_AXIS;
+            for (z, mu) in bz.iter().zip(&displacements[row..row + CONTROL_POINTS_PER_AXIS]) {
+                let weight = DISTORTION_BOX_SIDE * x * y * z;
+                for c in 0..3 {
+                    moved[c] += weight * mu[c];
+                }
+            }
+        }
+    }
+    moved
+}
+
+/// The five Bernstein polynomials of degree 4 at `u`.
+fn bernstein(u: f64) -> [f64; CONTROL_POINTS_PER_AXIS] {
+    let v = 1.0 - u;
+    [v * v * v * v, 4.0 * u * v * v * v, 6.0 * u * u * v * v, 4.0 * u * u * u * v, u * u * u * u]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::corruptions::testing::{cloud, rms_displacement, rng};
+
+    #[test]
+    fn a_lattice_moved_as_a_whole_moves_the_points_twice_as_far() {
+        let out = deform(&[0.3, -0.2, 0.9], &[[0.1, 0.0, -0.05]; CONTROL_POINTS]);
+        assert!((out[0] - 0.5).abs() < 1e-12 && out[1] == -0.2 && (out[2] - 0.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_corner_follows_its_control_point_and_outside_nothing_moves() {
+        let mut displacements = [[0.0; 3]; CONTROL_POINTS];
+        displacements[4] = [0.1, 0.2, 0.3]; // i = 0, j = 0, k = 4: the corner (-1, -1, 1)
+        let out = deform(&[-1.0, -1.0, 1.0], &displacements);
+        assert!((0..3).all(|c| (out[c] - [-0.8, -0.6, 1.6][c]).abs() < 1e-12), "{out:?}");
+        assert_eq!(deform(&[-1.0, -1.0, 1.1], &displacements), [-1.0, -1.0, 1.1]);
+    }
+
+    #[test]
+    fn strength() {
+        // On ModelNet40 shapes the rms displacement is 0.032, 0.064, 0.098, 0.130, 0.159; on
+        // spheres it is near that, over 60 draws within 10 %.
+        let points = cloud(512);
+        for (severity, rms) in Severity::ALL.into_iter().zip([0.032, 0.064, 0.098, 0.130, 0.159]) {
+            let found = rms_displacement(&Distortion, &points, severity, &mut rng(4), 60);
+            assert!((found / rms - 1.0).abs() < 0.15, "{severity}: {found} against {rms}");
+        }
+    }
+}
