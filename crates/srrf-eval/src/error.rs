@@ -1,0 +1,132 @@
+//! [`EvalError`]: why an evaluation cannot be done.
+
+use std::io;
+use std::path::PathBuf;
+
+use srrf_cloud::source::SourceError;
+use srrf_corrupt::{SeverityOutOfRange, UnknownCorruption};
+
+use crate::arrays::ArrayError;
+use crate::metrics::MetricError;
+
+/// Why an evaluation cannot be done.
+#[derive(Debug, thiserror::Error)]
+pub enum EvalError {
+    /// The data cannot be opened.
+    #[error(
+        "{source}\n\
+         {origin}\n\
+         Without data: `cargo run -p srrf-eval` evaluates on shapes that the program makes itself."
+    )]
+    Data {
+        /// Where the path came from.
+        origin: String,
+        /// What is wrong with it.
+        source: SourceError,
+    },
+    /// A shape cannot be read.
+    #[error("{0}")]
+    Shape(#[from] SourceError),
+    /// A pair cannot be made.
+    #[error("pair {item} of {group}: {problem}")]
+    Pair {
+        /// Name of the group.
+        group: String,
+        /// Number of the pair in it.
+        item: usize,
+        /// What went wrong.
+        problem: String,
+    },
+    /// A name that is no corruption.
+    #[error("{0}; or `clean`")]
+    Corruption(#[from] UnknownCorruption),
+    /// A number that is no severity.
+    #[error(transparent)]
+    Severity(#[from] SeverityOutOfRange),
+    /// A name that is no method.
+    #[error("unknown method `{name}`: choose from {known}")]
+    Method {
+        /// The name that was given.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A method cannot be set up.
+    #[error("method {name}: {problem}")]
+    Setup {
+        /// Its name.
+        name: String,
+        /// What is wrong, and the way out.
+        problem: String,
+    },
+    /// Options that cannot be used, or not together.
+    #[error("{0}")]
+    Usage(String),
+    /// A file of arrays cannot be used.
+    #[error(transparent)]
+    Arrays(#[from] ArrayError),
+    /// A file of transforms cannot be used.
+    #[error("{path:?}: {problem}")]
+    Transforms {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what is expected.
+        problem: String,
+    },
+    /// Clouds of one group differ in size, so that they make no array.
+    #[error("cannot export {group}: the clouds of {array} differ in size")]
+    Ragged {
+        /// Name of the group.
+        group: String,
+        /// Name of the array.
+        array: String,
+    },
+    /// The folder for results cannot be used.
+    #[error("cannot write results to {path:?}: {source}; choose another folder with --out")]
+    OutDir {
+        /// The folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// A result cannot be written.
+    #[error("cannot write {path:?}: {source}")]
+    Output {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// A picture cannot be drawn.
+    #[error("cannot draw {path:?}: {problem}")]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// What went wrong.
+        problem: String,
+    },
+    /// The errors of a method cannot be summed up.
+    #[error("{group}, {method}: {source}")]
+    Metric {
+        /// Name of the group.
+        group: String,
+        /// Name of the method.
+        method: String,
+        /// What is wrong.
+        source: MetricError,
+    },
+    /// Worker threads cannot be started.
+    #[error("cannot start worker threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+impl EvalError {
+    /// The exit code of a program that ends with this error: 2 for what the user can put right (usage
+    /// and input), 1 for failures.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Output { .. } | Self::Picture { .. } | Self::Metric { .. } | Self::Threads(_) => 1,
+            _ => 2,
+        }
+    }
+}

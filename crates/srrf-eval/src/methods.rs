@@ -1,0 +1,126 @@
+//! The registry of methods: a new method is one entry in [`METHODS`].
+
+use std::path::PathBuf;
+
+use srrf_baselines::{Icp, IcpConfig, Identity};
+use srrf_cloud::Register;
+
+use crate::EvalError;
+
+/// Name of the row that fits a pose to the true correspondences: the floor for any estimator that
+/// does least squares on matches.
+pub const ORACLE: &str = "oracle";
+
+/// What the entries of the registry may need to set up a method.
+#[derive(Debug, Clone, Default)]
+pub struct MethodContext {
+    /// `--weights`: a file of trained weights; `None` for those in the program.
+    pub weights: Option<PathBuf>,
+    /// `--device`: where tensors live, such as `flex`.
+    pub device: String,
+}
+
+/// A method ready to run.
+pub struct Method {
+    /// The method.
+    pub register: Box<dyn Register>,
+    /// Where its weights come from; `None` for methods that learn nothing.
+    pub weights: Option<String>,
+    /// Whether one call on a batch keeps all cores busy. Batches of other methods are run side by
+    /// side.
+    pub parallel_inside: bool,
+}
+
+/// An entry of the registry.
+pub struct MethodEntry {
+    /// Name of the method, as its `Register::name`.
+    pub name: &'static str,
+    /// Names of the rows that it fills, in the order of the tables: a row for each branch
+    /// (`<name>-<branch>`), then the method itself.
+    pub rows: &'static [&'static str],
+    /// Whether it runs when `--methods` is not given.
+    pub by_default: bool,
+    /// Sets the method up; errors are in words.
+    pub build: fn(&MethodContext) -> Result<Method, String>,
+}
+
+/// All methods, in the order of the tables. [`ORACLE`] is not among them: it is no `Register`, since
+/// it needs to know the correspondences.
+pub const METHODS: &[MethodEntry] = &[
+    MethodEntry { name: "identity", rows: &["identity"], by_default: true, build: |_| Ok(plain(Identity)) },
+    MethodEntry { name: "icp", rows: &["icp"], by_default: true, build: |_| Ok(plain(Icp::default())) },
+    MethodEntry {
+        name: "icp-centred",
+        rows: &["icp-centred"],
+        by_default: false,
+        build: |_| Ok(plain(Icp::new(IcpConfig { centred: true, ..IcpConfig::default() }))),
+    },
+];
+
+fn plain(register: impl Register + 'static) -> Method {
+    Method { register: Box::new(register), weights: None, parallel_inside: false }
+}
+
+/// The rows of a run and the methods that fill them.
+pub struct Selection {
+    /// Entries to set up.
+    pub entries: Vec<&'static MethodEntry>,
+    /// Rows of the tables, in order.
+    pub rows: Vec<String>,
+}
+
+/// All row names, in the order of the tables.
+pub fn all_rows() -> Vec<&'static str> {
+    let mut rows: Vec<&str> = METHODS.iter().flat_map(|m| m.rows).copied().collect();
+    // The oracle stands after the classical methods, before the learned ones.
+    let place = rows.iter().position(|r| r.starts_with("srrf")).unwrap_or(rows.len());
+    rows.insert(place, ORACLE);
+    rows
+}
+
+/// Chooses rows by name (`--methods`); all default rows where `names` is empty.
+///
+/// # Errors
+/// [`EvalError::Method`] for a name that is no row.
+pub fn select(names: &[String]) -> Result<Selection, EvalError> {
+    let known = all_rows();
+    if let Some(name) = names.iter().find(|name| !known.contains(&name.as_str())) {
+        return Err(EvalError::Method { name: name.clone(), known: known.join(", ") });
+    }
+    let wanted = |row: &str, by_default: bool| {
+        if names.is_empty() { by_default } else { names.iter().any(|n| n == row) }
+    };
+    let by_default = |row: &str| METHODS.iter().find(|m| m.rows.contains(&row)).is_none_or(|m| m.by_default);
+    let rows: Vec<String> =
+        known.iter().filter(|row| wanted(row, by_default(row))).map(|row| (*row).to_owned()).collect();
+    let entries = METHODS.iter().filter(|m| m.rows.iter().any(|r| rows.iter().any(|row| row == r))).collect();
+    Ok(Selection { entries, rows })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_agree_with_the_methods() {
+        let context = MethodContext { weights: None, device: "flex".into() };
+        for entry in METHODS {
+            let method = (entry.build)(&context).unwrap();
+            assert_eq!(method.register.name(), entry.name);
+            assert_eq!(entry.rows.last(), Some(&entry.name));
+        }
+    }
+
+    #[test]
+    fn rows_are_chosen_by_name_and_kept_in_order() {
+        let names = |list: &[&str]| list.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>();
+        let chosen = select(&names(&["oracle", "identity"])).unwrap();
+        assert_eq!(chosen.rows, ["identity", "oracle"]);
+        assert_eq!(chosen.entries.len(), 1);
+        let default = select(&[]).unwrap();
+        assert_eq!(default.rows[..3], ["identity", "icp", "oracle"]);
+        assert!(!default.rows.iter().any(|r| r == "icp-centred"));
+        let error = select(&names(&["icp", "magic"])).err().unwrap().to_string();
+        assert!(error.contains("`magic`") && error.contains("identity, icp"), "{error}");
+    }
+}

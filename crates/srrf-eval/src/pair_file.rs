@@ -1,0 +1,265 @@
+//! Files of pairs: `--pairs FILE.npz` and `--export-pairs FILE.npz`.
+//!
+//! For each group of `n` pairs the file holds
+//!
+//! | array | shape | |
+//! |---|---|---|
+//! | `<group>_x` | `[n, N, 3]` | sources |
+//! | `<group>_y` | `[n, M, 3]` | targets |
+//! | `<group>_R` | `[n, 3, 3]` | true rotations |
+//! | `<group>_t` | `[n, 3]` | true translations: `target = R source + t` |
+//! | `<group>_clean` | `[n, K, 3]` | optional: the clean shape in the source frame |
+//! | `<group>_symmetric` | `[n]` | optional: whether the shape is symmetric about an axis |
+//!
+//! as `float32` or `float64`, in C or Fortran order. Exported files hold `float64`.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Matrix3, Vector3};
+use srrf_cloud::{PointCloud, Rigid};
+
+use crate::arrays::{self, Array, ArrayError, NpzWriter};
+use crate::pairs::{EvalPair, Group, PairSource};
+use crate::{EvalError, output};
+
+/// Largest deviation of `R^T R` from the identity, per entry, in a true rotation: well above
+/// `float32` rounding.
+const ROTATION_TOLERANCE: f64 = 1e-3;
+
+/// The pairs of a file, in memory.
+#[derive(Debug)]
+pub struct PairFile {
+    path: PathBuf,
+    groups: Vec<Group>,
+    contents: Vec<GroupArrays>,
+}
+
+#[derive(Debug)]
+struct GroupArrays {
+    x: Array,
+    y: Array,
+    poses: Vec<Rigid>,
+    clean: Option<Array>,
+    symmetric: Option<Array>,
+}
+
+impl PairFile {
+    /// Reads and checks a file of pairs.
+    ///
+    /// # Errors
+    /// [`ArrayError`] which names the file, the array, what is wrong and what is expected.
+    pub fn read(path: &Path) -> Result<Self, ArrayError> {
+        let mut arrays = arrays::read_npz(path)?;
+        let mut names: Vec<String> = arrays
+            .keys()
+            .filter_map(|name| ["_x", "_y", "_R", "_t"].iter().find_map(|end| name.strip_suffix(end)))
+            .map(str::to_owned)
+            .collect();
+        names.sort();
+        names.dedup();
+        let bad = |array: &str, problem: String| ArrayError::Array {
+            path: path.to_owned(),
+            array: array.to_owned(),
+            problem,
+        };
+        if names.is_empty() {
+            let have: Vec<&str> = arrays.keys().map(String::as_str).collect();
+            let problem = format!(
+                "no group of pairs: expected arrays <group>_x, <group>_y, <group>_R and <group>_t, found {have:?}"
+            );
+            return Err(bad("<group>_x", problem));
+        }
+        let (mut groups, mut contents) = (Vec::new(), Vec::new());
+        for name in names {
+            let content =
+                GroupArrays::take(&mut arrays, &name).map_err(|(array, problem)| bad(&array, problem))?;
+            groups.push(Group { corruption: name, severity: 0, pairs: content.poses.len() });
+            contents.push(content);
+        }
+        Ok(Self { path: path.to_owned(), groups, contents })
+    }
+}
+
+/// Name of an array and what is wrong with it.
+type Problem = (String, String);
+
+impl GroupArrays {
+    /// Takes and checks the arrays of one group.
+    fn take(arrays: &mut BTreeMap<String, Array>, group: &str) -> Result<Self, Problem> {
+        let x = take(arrays, group, "x", &[None, None, Some(3)])?;
+        let n = x.shape[0];
+        let y = take(arrays, group, "y", &[Some(n), None, Some(3)])?;
+        let rotations = take(arrays, group, "R", &[Some(n), Some(3), Some(3)])?;
+        let translations = take(arrays, group, "t", &[Some(n), Some(3)])?;
+        let mut optional = |suffix: &str, shape: &[Option<usize>]| {
+            let present = arrays.contains_key(&format!("{group}_{suffix}"));
+            present.then(|| take(arrays, group, suffix, shape)).transpose()
+        };
+        let clean = optional("clean", &[Some(n), None, Some(3)])?;
+        let symmetric = optional("symmetric", &[Some(n)])?;
+        let poses = poses(&rotations, &translations).map_err(|problem| (format!("{group}_R"), problem))?;
+        Ok(Self { x, y, poses, clean, symmetric })
+    }
+}
+
+/// Takes the array `<group>_<suffix>`, which must have the shape `expected` (`None`: any length),
+/// some entries, and finite ones only.
+fn take(
+    arrays: &mut BTreeMap<String, Array>,
+    group: &str,
+    suffix: &str,
+    expected: &[Option<usize>],
+) -> Result<Array, Problem> {
+    let name = format!("{group}_{suffix}");
+    let Some(array) = arrays.remove(&name) else {
+        return Err((name, format!("is missing; expected shape {}", describe(expected))));
+    };
+    let fits = array.shape.len() == expected.len()
+        && array.shape.iter().zip(expected).all(|(&have, want)| want.is_none_or(|w| w == have));
+    if !fits {
+        let problem = format!("has shape {:?}, expected {}", array.shape, describe(expected));
+        return Err((name, problem));
+    }
+    if array.values.is_empty() {
+        return Err((name, format!("has shape {:?}: it is empty", array.shape)));
+    }
+    if let Some(index) = array.values.iter().position(|v| !v.is_finite()) {
+        let pair = index / (array.values.len() / array.shape[0]);
+        let value = array.values[index];
+        return Err((name, format!("pair {pair} holds {value}: every number must be finite")));
+    }
+    Ok(array)
+}
+
+/// A shape in words, such as `[7, any, 3]`.
+fn describe(shape: &[Option<usize>]) -> String {
+    let axes: Vec<String> = shape.iter().map(|d| d.map_or("any".into(), |d| d.to_string())).collect();
+    format!("[{}]", axes.join(", "))
+}
+
+/// The true poses, whose rotations are checked and rid of rounding.
+fn poses(rotations: &Array, translations: &Array) -> Result<Vec<Rigid>, String> {
+    let rows = rotations.values.chunks_exact(9).zip(translations.values.chunks_exact(3));
+    rows.enumerate()
+        .map(|(pair, (r, t))| {
+            let rotation = checked_rotation(&Matrix3::from_row_slice(r))
+                .map_err(|problem| format!("pair {pair} {problem}"))?;
+            Ok(Rigid { rotation, translation: Vector3::from_row_slice(t) })
+        })
+        .collect()
+}
+
+/// The rotation nearest to `matrix`, which must be one up to rounding.
+///
+/// # Errors
+/// In words, where it is not.
+pub(crate) fn checked_rotation(matrix: &Matrix3<f64>) -> Result<Matrix3<f64>, String> {
+    let deviation = (matrix.transpose() * matrix - Matrix3::identity()).abs().max();
+    let determinant = matrix.determinant();
+    if deviation.is_nan() || deviation > ROTATION_TOLERANCE || determinant < 0.0 {
+        return Err(format!(
+            "is not a rotation: R^T R is off the identity by {deviation:.2e} and det R = {determinant:.4}"
+        ));
+    }
+    Rigid::nearest_rotation(matrix).ok_or_else(|| "is not a rotation".to_owned())
+}
+
+impl PairSource for PairFile {
+    fn description(&self) -> String {
+        let pairs: usize = self.groups.iter().map(|g| g.pairs).sum();
+        format!("{pairs} pairs in {} groups, {}", self.groups.len(), self.path.display())
+    }
+
+    fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    fn has_oracle(&self) -> bool {
+        false
+    }
+
+    fn pair(&self, group: usize, item: usize) -> Result<EvalPair, EvalError> {
+        let arrays = &self.contents[group];
+        let name = &self.groups[group].corruption;
+        let cloud = |array: &Array, suffix: &str| {
+            PointCloud::new(row(array, item)).map_err(|e| {
+                EvalError::from(ArrayError::Array {
+                    path: self.path.clone(),
+                    array: format!("{name}_{suffix}"),
+                    problem: format!("pair {item}: {e}"),
+                })
+            })
+        };
+        Ok(EvalPair {
+            id: format!("{name}_{item}"),
+            class: String::new(),
+            symmetric: arrays.symmetric.as_ref().is_some_and(|a| a.values[item] != 0.0),
+            source: cloud(&arrays.x, "x")?,
+            target: cloud(&arrays.y, "y")?,
+            target_from_source: arrays.poses[item],
+            clean: arrays.clean.as_ref().map(|a| row(a, item)),
+            oracle: None,
+        })
+    }
+}
+
+/// Row `item` of an array of shape `[n, k, 3]`.
+fn row(array: &Array, item: usize) -> Vec<[f64; 3]> {
+    let length = array.shape[1];
+    let (points, _) = array.values.as_chunks::<3>();
+    points[item * length..(item + 1) * length].to_vec()
+}
+
+/// Writes all pairs of `source` to `path`, first under a temporary name. `after_pair` is called
+/// after each pair.
+///
+/// # Errors
+/// [`EvalError`] where a pair cannot be made or the file cannot be written, and where the clouds of
+/// one group differ in size.
+pub fn export(source: &dyn PairSource, path: &Path, after_pair: &mut dyn FnMut()) -> Result<(), EvalError> {
+    let io = |source: io::Error| EvalError::Output { path: path.to_owned(), source };
+    let temporary = output::temporary_beside(path).map_err(io)?;
+    let mut npz = NpzWriter::new(io::BufWriter::new(temporary));
+    for (index, group) in source.groups().iter().enumerate() {
+        let pairs = (0..group.pairs)
+            .map(|item| {
+                let pair = source.pair(index, item);
+                after_pair();
+                pair
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let (name, n) = (group.name(), pairs.len());
+        let mut points = |suffix: &str, of: &dyn Fn(&EvalPair) -> Option<&[[f64; 3]]>| {
+            let rows: Vec<&[[f64; 3]]> = pairs.iter().filter_map(of).collect();
+            let length = rows.first().map_or(0, |r| r.len());
+            if rows.len() < n || rows.iter().any(|r| r.len() != length) {
+                return if suffix == "clean" {
+                    Ok(()) // optional, and of no use where it is not the same for all
+                } else {
+                    Err(EvalError::Ragged { group: name.clone(), array: format!("{name}_{suffix}") })
+                };
+            }
+            let values: Vec<f64> = rows.iter().flat_map(|r| r.as_flattened()).copied().collect();
+            npz.array(&format!("{name}_{suffix}"), &[n, length, 3], &values).map_err(io)
+        };
+        points("x", &|p| Some(p.source.points()))?;
+        points("y", &|p| Some(p.target.points()))?;
+        points("clean", &|p| p.clean.as_deref())?;
+        let rotations: Vec<f64> = pairs
+            .iter()
+            .flat_map(|p| p.target_from_source.rotation.transpose().iter().copied().collect::<Vec<_>>())
+            .collect();
+        let translations: Vec<f64> = pairs
+            .iter()
+            .flat_map(|p| p.target_from_source.translation.iter().copied().collect::<Vec<_>>())
+            .collect();
+        let symmetric: Vec<f64> = pairs.iter().map(|p| f64::from(p.symmetric)).collect();
+        npz.array(&format!("{name}_R"), &[n, 3, 3], &rotations).map_err(io)?;
+        npz.array(&format!("{name}_t"), &[n, 3], &translations).map_err(io)?;
+        npz.array(&format!("{name}_symmetric"), &[n], &symmetric).map_err(io)?;
+    }
+    let file = npz.finish().map_err(io)?.into_inner().map_err(|e| io(e.into_error()))?;
+    output::persist(file, path).map_err(io)
+}
