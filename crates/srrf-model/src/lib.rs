@@ -1,1 +1,40 @@
-//! Placeholder
+//! The SRRF network: skeleton extraction, structural features, feature interaction, soft matching,
+//! a differentiable SVD, and the fusion of both branches, as Burn modules.
+//!
+//! The modules name no backend: the device picks it at run time. [`Srrf::forward`] reads as the
+//! paper's figure 2; each stage is one file.
+//!
+//! Clouds enter in network units (see [`PairBatch`]). For registration in any unit, use
+//! [`SrrfRegister`].
+
+pub mod attention;
+mod batch;
+mod branch;
+mod device;
+pub mod geometry;
+pub mod init;
+mod integration;
+mod loss;
+mod matching;
+mod pfi;
+mod procrustes;
+mod register;
+mod sem;
+mod sem_loss;
+mod sfe;
+mod srrf;
+pub mod weights;
+
+pub use device::{NAMES as DEVICE_NAMES, UnknownDevice, device};
+pub use batch::{PairBatch, PairFrame};
+pub use branch::{Branch, BranchConfig, BranchOutput};
+pub use integration::{BranchPose, Fusion, InlierTest, IntegrationConfig};
+pub use loss::{correspondence_loss, registration_loss};
+pub use matching::{SoftMatches, SoftMatching};
+pub use pfi::{Pfi, PfiConfig};
+pub use procrustes::{nearest_rotation, procrustes, transform};
+pub use register::SrrfRegister;
+pub use sem::{LevelConfig, Sem, SemConfig, Skeleton, nearest_distance};
+pub use sem_loss::{SkeletonLoss, SkeletonLossConfig, chamfer, skeleton_loss, spread};
+pub use sfe::{Sfe, SfeConfig};
+pub use srrf::{Srrf, SrrfConfig, SrrfOutput};

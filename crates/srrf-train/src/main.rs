@@ -1,2 +1,121 @@
-//! main
-fn main() {}
+//! `srrf-train --config configs/modelnet.toml`: trains the SRRF network.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use burn::tensor::Device;
+use clap::Parser;
+use srrf_cloud::{ProceduralShapes, ShapeSource, SourceError, Split};
+use srrf_train::config::{DataSource, TrainConfig};
+use srrf_train::resources::keep_freed_memory;
+use srrf_train::run::{Existing, RunError, RunOptions, run};
+
+/// Trains the SRRF network.
+///
+/// Writes into the run's folder: the resolved config.toml, metrics.jsonl, curve.svg, a checkpoint,
+/// and the weights `best.safetensors` (by validation) and `last.safetensors`.
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    /// The configuration; see configs/.
+    #[arg(long)]
+    config: PathBuf,
+    /// Where ModelNet40 is; before `data.path` of the configuration.
+    #[arg(long, env = "SRRF_DATA")]
+    data: Option<PathBuf>,
+    /// Folder of the run [default: runs/NAME].
+    #[arg(long)]
+    run: Option<PathBuf>,
+    /// Go on from the checkpoint in the run's folder, if there is one.
+    #[arg(long, conflicts_with = "restart")]
+    resume: bool,
+    /// Start over, whatever the run's folder holds.
+    #[arg(long)]
+    restart: bool,
+    /// Stop when the run stands at this step.
+    #[arg(long)]
+    until_step: Option<usize>,
+    /// Stop after this many minutes; --resume goes on.
+    #[arg(long)]
+    minutes: Option<f64>,
+    /// Worker threads; changes the time, not the result [default: all cores].
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Device: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda` where built in.
+    #[arg(long, default_value = "flex")]
+    device: String,
+}
+
+/// A message and an exit code: 2 for bad usage or input, 1 for a failure.
+struct Failure(u8, String);
+
+fn main() -> ExitCode {
+    keep_freed_memory();
+    match train(Arguments::parse()) {
+        Ok(code) => code,
+        Err(Failure(code, message)) => {
+            tell(&format!("error: {message}"));
+            ExitCode::from(code)
+        }
+    }
+}
+
+#[allow(clippy::print_stderr, reason = "the binary's one place to speak")]
+fn tell(message: &str) {
+    eprintln!("{message}");
+}
+
+fn train(arguments: Arguments) -> Result<ExitCode, Failure> {
+    let usage = |e: &dyn std::fmt::Display| Failure(2, e.to_string());
+    let config = TrainConfig::read(&arguments.config).map_err(|e| usage(&e))?;
+    let device = srrf_model::device(&arguments.device).map_err(|e| usage(&e))?;
+    let shapes = shapes(&config, arguments.data.as_deref()).map_err(|e| usage(&e))?;
+    let options = RunOptions {
+        folder: arguments.run.unwrap_or_else(|| Path::new("runs").join(&config.name)),
+        threads: arguments.threads.unwrap_or_else(cores),
+        existing: match (arguments.resume, arguments.restart) {
+            (true, _) => Existing::Resume,
+            (_, true) => Existing::Restart,
+            _ => Existing::Refuse,
+        },
+        until_step: arguments.until_step,
+        time_limit: arguments.minutes.map(|m| Duration::from_secs_f64(m.max(0.0) * 60.0)),
+    };
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = stop.clone();
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
+        .map_err(|e| Failure(1, format!("no handler for Ctrl-C: {e}")))?;
+
+    tell(&format!("config {}, data {}", arguments.config.display(), shapes.description()));
+    tell(&format!("run {}, device {}, {} threads", options.folder.display(), arguments.device, options.threads));
+    let ended = run(&config, &options, shapes, device, &stop).map_err(|e| {
+        let code = if matches!(e, RunError::Exists { .. } | RunError::Checkpoint(_)) { 2 } else { 1 };
+        Failure(code, e.to_string())
+    })?;
+    let best = ended.best.map_or("none yet".into(), |path| path.display().to_string());
+    tell(&format!("step {}, {} left out as not finite, best weights: {best}", ended.step, ended.skipped));
+    if stop.load(Ordering::Relaxed) {
+        tell("stopped; the checkpoint is saved, --resume goes on");
+        return Ok(ExitCode::from(130));
+    }
+    if !ended.complete {
+        tell("not complete; --resume goes on");
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// The shapes that the configuration asks for.
+fn shapes(config: &TrainConfig, data: Option<&Path>) -> Result<Box<dyn ShapeSource>, SourceError> {
+    match (config.data.source, data.or(config.data.path.as_deref())) {
+        (DataSource::Shapes, _) => Ok(Box::new(ProceduralShapes::new(config.seed, config.data.shapes, None))),
+        (DataSource::Modelnet, Some(path)) => srrf_cloud::open(path, Split::Train),
+        (DataSource::Modelnet, None) => Err(SourceError::NotGiven),
+    }
+}

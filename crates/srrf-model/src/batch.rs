@@ -1,0 +1,122 @@
+//! From pairs of clouds to tensors and back: the frame in which the network works.
+
+use burn::tensor::{Device, Tensor, TensorData};
+use nalgebra::{Matrix3, Vector3};
+use srrf_cloud::{PointCloud, Rigid};
+
+/// Root mean square radius that clouds have inside the network. Clouds of ModelNet40 in the unit
+/// sphere have about this one, so thresholds in network units read as shares of the radius.
+const NETWORK_RMS: f64 = 0.6;
+
+/// Where a pair's clouds lie in network units: each centred on its own mean, both divided by one
+/// scale, so that the rotation stays what it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairFrame {
+    source_mean: Vector3<f64>,
+    target_mean: Vector3<f64>,
+    scale: f64,
+}
+
+impl PairFrame {
+    /// The frame of a pair.
+    pub fn new(source: &PointCloud, target: &PointCloud) -> Self {
+        let (source_mean, target_mean) = (source.centroid(), target.centroid());
+        let mean_square = |cloud: &PointCloud, mean: Vector3<f64>| {
+            cloud.points().iter().map(|p| (Vector3::from(*p) - mean).norm_squared()).sum::<f64>() / cloud.len() as f64
+        };
+        let rms = ((mean_square(source, source_mean) + mean_square(target, target_mean)) / 2.0).sqrt();
+        let scale = if rms > 0.0 { rms / NETWORK_RMS } else { 1.0 };
+        Self { source_mean, target_mean, scale }
+    }
+
+    /// Source coordinates in network units.
+    pub fn source(&self, point: &[f64; 3]) -> [f64; 3] {
+        ((Vector3::from(*point) - self.source_mean) / self.scale).into()
+    }
+
+    /// Target coordinates in network units.
+    pub fn target(&self, point: &[f64; 3]) -> [f64; 3] {
+        ((Vector3::from(*point) - self.target_mean) / self.scale).into()
+    }
+
+    /// A pose between the given clouds as the network sees it.
+    pub fn to_network(&self, target_from_source: &Rigid) -> Rigid {
+        let Rigid { rotation, translation } = target_from_source;
+        let translation = (translation + rotation * self.source_mean - self.target_mean) / self.scale;
+        Rigid { rotation: *rotation, translation }
+    }
+
+    /// A pose that the network found, between the given clouds.
+    pub fn from_network(&self, pose: &Rigid) -> Rigid {
+        let translation = self.scale * pose.translation + self.target_mean - pose.rotation * self.source_mean;
+        Rigid { rotation: pose.rotation, translation }
+    }
+}
+
+/// A batch of pairs on a device, every cloud with the same number of points.
+#[derive(Debug, Clone)]
+pub struct PairBatch {
+    /// `[batch, points, 3]`, network units.
+    pub source: Tensor<3>,
+    /// `[batch, points, 3]`, network units.
+    pub target: Tensor<3>,
+    /// One frame a pair.
+    pub frames: Vec<PairFrame>,
+}
+
+impl PairBatch {
+    /// Brings pairs of clouds to the device. `None` unless there is a pair and all clouds have the
+    /// same number of points.
+    pub fn new(pairs: &[(&PointCloud, &PointCloud)], device: &Device) -> Option<Self> {
+        let points = pairs.first()?.0.len();
+        if pairs.iter().any(|(source, target)| source.len() != points || target.len() != points) {
+            return None;
+        }
+        let frames: Vec<PairFrame> = pairs.iter().map(|(source, target)| PairFrame::new(source, target)).collect();
+        let shape = [pairs.len(), points, 3];
+        let tensor = |values: Vec<f32>| Tensor::<3>::from_data(TensorData::new(values, shape), device);
+        let mut source = Vec::with_capacity(shape.iter().product());
+        let mut target = Vec::with_capacity(shape.iter().product());
+        for ((x, y), frame) in pairs.iter().zip(&frames) {
+            source.extend(x.points().iter().flat_map(|p| frame.source(p)).map(|v| v as f32));
+            target.extend(y.points().iter().flat_map(|p| frame.target(p)).map(|v| v as f32));
+        }
+        Some(Self { source: tensor(source), target: tensor(target), frames })
+    }
+
+    /// True poses, in network units, as tensors `[batch, 3, 3]` and `[batch, 3]`.
+    pub fn truth(&self, target_from_source: &[Rigid]) -> (Tensor<3>, Tensor<2>) {
+        let device = self.source.device();
+        let (mut rotations, mut translations) = (Vec::new(), Vec::new());
+        for (frame, pose) in self.frames.iter().zip(target_from_source) {
+            let pose = frame.to_network(pose);
+            rotations.extend(pose.rotation.transpose().iter().map(|&v| v as f32)); // row-major
+            translations.extend(pose.translation.iter().map(|&v| v as f32));
+        }
+        let batch = self.frames.len();
+        (
+            Tensor::from_data(TensorData::new(rotations, [batch, 3, 3]), &device),
+            Tensor::from_data(TensorData::new(translations, [batch, 3]), &device),
+        )
+    }
+
+    /// Poses that the network found, between the given clouds. The rotation is projected to SO(3)
+    /// in `f64`; `None` for a pose that is not finite.
+    ///
+    /// # Shapes
+    /// - `rotation`: `[batch, 3, 3]`, `translation`: `[batch, 3]`
+    pub fn poses(&self, rotation: &Tensor<3>, translation: &Tensor<2>) -> Vec<Option<Rigid>> {
+        let rotations = rotation.to_data_as::<f64>().to_vec::<f64>().unwrap_or_default();
+        let translations = translation.to_data_as::<f64>().to_vec::<f64>().unwrap_or_default();
+        self.frames
+            .iter()
+            .zip(rotations.chunks_exact(9).zip(translations.chunks_exact(3)))
+            .map(|(frame, (r, t))| {
+                let rotation = Rigid::nearest_rotation(&Matrix3::from_row_slice(r))?;
+                let translation = Vector3::from_column_slice(t);
+                translation.iter().all(|v| v.is_finite()).then_some(())?;
+                Some(frame.from_network(&Rigid { rotation, translation }))
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,119 @@
+//! One registration branch: SFE, PFI, soft matching and the SVD head. The dense branch runs it on
+//! the clouds, the skeleton branch on the skeletons.
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::{HostClouds, even_subsample, flat_indices, rows};
+use crate::integration::BranchPose;
+use crate::matching::SoftMatching;
+use crate::pfi::{Pfi, PfiConfig};
+use crate::procrustes::procrustes;
+use crate::sfe::{Sfe, SfeConfig};
+
+/// Sizes of one branch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BranchConfig {
+    /// Points of each cloud that carry features; 0 for all, as in the paper. Attention costs the
+    /// square of it. The others still serve as neighbours in the first LFI.
+    pub tokens: usize,
+    /// The structural feature extractor.
+    pub sfe: SfeConfig,
+    /// The feature interaction.
+    pub pfi: PfiConfig,
+}
+
+impl BranchConfig {
+    /// A new branch.
+    pub fn init(&self, device: &Device) -> Branch {
+        Branch {
+            sfe: self.sfe.init(device),
+            pfi: self.pfi.init(self.sfe.output_width(), device),
+            matching: SoftMatching::new(device),
+            tokens: self.tokens,
+        }
+    }
+}
+
+/// SFE -> PFI -> soft matching -> SVD. Weights are shared between source and target.
+#[derive(Module, Debug)]
+pub struct Branch {
+    sfe: Sfe,
+    pfi: Pfi,
+    matching: SoftMatching,
+    tokens: usize,
+}
+
+/// What a branch found.
+#[derive(Debug, Clone)]
+pub struct BranchOutput {
+    /// `[batch, 3, 3]`.
+    pub rotation: Tensor<3>,
+    /// `[batch, 3]`.
+    pub translation: Tensor<2>,
+    /// The source points that were matched: `[batch, n, 3]`.
+    pub source_points: Tensor<3>,
+    /// The target points they were matched with: `[batch, n, 3]`.
+    pub target_points: Tensor<3>,
+    /// Soft matches of the source points: `[batch, n, 3]`.
+    pub matches: Tensor<3>,
+    /// Probability of each target point for each source point: `[batch, n, n]`.
+    pub probabilities: Tensor<3>,
+}
+
+impl BranchOutput {
+    /// The view that the integration takes.
+    pub fn pose(&self) -> BranchPose<'_> {
+        BranchPose {
+            rotation: &self.rotation,
+            translation: &self.translation,
+            points: &self.source_points,
+            matches: &self.matches,
+        }
+    }
+}
+
+impl Branch {
+    /// Replaces the number of tokens (0 for all points): more of them cost time and gain accuracy,
+    /// also when the branch was trained with fewer.
+    pub fn with_tokens(mut self, tokens: usize) -> Self {
+        self.tokens = tokens;
+        self
+    }
+
+    /// `phase` in [0, 1) chooses which points become tokens.
+    ///
+    /// # Shapes
+    /// - `source`, `target`: `[batch, points, 3]`, of equal numbers of points
+    pub fn forward(&self, source: Tensor<3>, target: Tensor<3>, phase: f32) -> BranchOutput {
+        let [batch, _, _] = source.dims();
+        let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
+        let tokens = self.choose_tokens(clouds.clone(), phase); // [2 batch, n, 3]
+        let features = self.sfe.forward(tokens.clone(), clouds); // F
+        let features = self.pfi.forward(features, tokens.clone()); // Phi
+        let half = |x: &Tensor<3>, which: usize| x.clone().narrow(0, which * batch, batch);
+        let (source_points, target_points) = (half(&tokens, 0), half(&tokens, 1));
+        let matches = self.matching.forward(half(&features, 0), half(&features, 1), target_points.clone());
+        let (rotation, translation) = procrustes(source_points.clone(), matches.points.clone());
+        BranchOutput {
+            rotation,
+            translation,
+            source_points,
+            target_points,
+            matches: matches.points,
+            probabilities: matches.probabilities,
+        }
+    }
+
+    fn choose_tokens(&self, clouds: Tensor<3>, phase: f32) -> Tensor<3> {
+        let [batch, points, _] = clouds.dims();
+        if self.tokens == 0 || self.tokens >= points {
+            return clouds;
+        }
+        let host = HostClouds::read(&clouds);
+        let chosen = flat_indices(host.iter(), points, |_, cloud| even_subsample(cloud, self.tokens, phase));
+        rows(clouds.reshape([batch * points, 3]), &chosen).reshape([batch, self.tokens, 3])
+    }
+}

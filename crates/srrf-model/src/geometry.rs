@@ -1,0 +1,231 @@
+//! Neighbours and samples on the host, for batches of clouds that live in tensors.
+//!
+//! Indices are not differentiable, so they are found in plain `f32` arrays: nearest neighbours by
+//! brute force (at a thousand points faster than any tree that must first be built), farthest
+//! point sampling, and an even subsample along a space-filling curve. All are deterministic, and
+//! the choice of points does not depend on their order in the cloud.
+
+use burn::tensor::{Int, Tensor, TensorData};
+
+/// A batch of clouds copied to the host: shape `[batch, points, 3]`.
+#[derive(Debug, Clone)]
+pub struct HostClouds {
+    points: Vec<[f32; 3]>,
+    per_cloud: usize,
+}
+
+impl HostClouds {
+    /// Copies `clouds`, shape `[batch, points, 3]`.
+    pub fn read(clouds: &Tensor<3>) -> Self {
+        let [_, per_cloud, _] = clouds.dims();
+        let flat: Vec<f32> = clouds.to_data_as::<f32>().to_vec::<f32>().unwrap_or_default();
+        let points = flat.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+        Self { points, per_cloud }
+    }
+
+    /// The clouds one by one.
+    pub fn iter(&self) -> impl Iterator<Item = &[[f32; 3]]> {
+        self.points.chunks_exact(self.per_cloud.max(1))
+    }
+
+    /// The clouds at the rows `indices` (as [`flat_indices`] numbers them), `per_cloud` rows each.
+    pub fn select(&self, indices: &[i64], per_cloud: usize) -> Self {
+        Self { points: indices.iter().map(|&i| self.points[i as usize]).collect(), per_cloud }
+    }
+}
+
+/// Squared Euclidean distance.
+fn squared(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+    let (dx, dy, dz) = (a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+    dx * dx + dy * dy + dz * dz
+}
+
+/// Row numbers into the flattened `[batch * points, channels]` table: `per_cloud(i)` gives the
+/// indices inside cloud `i`, which are shifted by `i * support_points`.
+pub fn flat_indices<'a>(
+    clouds: impl Iterator<Item = &'a [[f32; 3]]>,
+    support_points: usize,
+    mut per_cloud: impl FnMut(usize, &'a [[f32; 3]]) -> Vec<u32>,
+) -> Vec<i64> {
+    let mut out = Vec::new();
+    for (i, cloud) in clouds.enumerate() {
+        let base = (i * support_points) as i64;
+        out.extend(per_cloud(i, cloud).into_iter().map(|j| base + i64::from(j)));
+    }
+    out
+}
+
+/// The `k` nearest points of `support` for each of `queries`, nearest first, ties by index:
+/// `queries * k` indices. Where the support has fewer than `k` points they are repeated in turn.
+pub fn k_nearest(queries: &[[f32; 3]], support: &[[f32; 3]], k: usize) -> Vec<u32> {
+    let found = k.min(support.len());
+    let mut out = Vec::with_capacity(queries.len() * k);
+    let mut best: Vec<(f32, u32)> = Vec::with_capacity(found + 1);
+    let mut distances = vec![0.0_f32; support.len()];
+    for query in queries {
+        for (d, p) in distances.iter_mut().zip(support) {
+            *d = squared(query, p);
+        }
+        best.clear();
+        let mut worst = f32::INFINITY;
+        for (j, &d) in distances.iter().enumerate() {
+            if best.len() < found || d < worst {
+                let at = best.partition_point(|&(other, _)| other <= d);
+                best.insert(at, (d, j as u32));
+                best.truncate(found);
+                worst = best.last().map_or(f32::INFINITY, |&(d, _)| d);
+            }
+        }
+        out.extend((0..k).map(|j| best[j % found].1));
+    }
+    out
+}
+
+/// The nearest point of `support` for each of `queries`: `queries` indices, ties to the first.
+pub fn nearest(queries: &[[f32; 3]], support: &[[f32; 3]]) -> Vec<u32> {
+    let mut distances = vec![0.0_f32; support.len()];
+    queries
+        .iter()
+        .map(|query| {
+            let mut least = f32::INFINITY;
+            for (d, p) in distances.iter_mut().zip(support) {
+                *d = squared(query, p);
+                least = least.min(*d);
+            }
+            distances.iter().position(|&d| d == least).unwrap_or(0) as u32
+        })
+        .collect()
+}
+
+/// Share of `points` whose nearest neighbour in `support` is closer than `radius`.
+pub fn share_within(points: &[[f32; 3]], support: &[[f32; 3]], radius: f32) -> f64 {
+    let hits = points
+        .iter()
+        .filter(|p| support.iter().fold(f32::INFINITY, |least, q| least.min(squared(p, q))) < radius * radius)
+        .count();
+    hits as f64 / points.len().max(1) as f64
+}
+
+/// Farthest point sampling, started at the point farthest from the mean: `count` indices, in the
+/// order of choice. Repeats in turn where the cloud has fewer points.
+pub fn farthest_points(points: &[[f32; 3]], count: usize) -> Vec<u32> {
+    let n = points.len();
+    let mut mean = [0.0_f32; 3];
+    for p in points {
+        for c in 0..3 {
+            mean[c] += p[c] / n as f32;
+        }
+    }
+    let farthest = |distances: &[f32]| {
+        let mut best = 0;
+        for (i, &d) in distances.iter().enumerate() {
+            if d > distances[best] {
+                best = i;
+            }
+        }
+        best
+    };
+    let to_mean: Vec<f32> = points.iter().map(|p| squared(p, &mean)).collect();
+    let mut chosen = vec![farthest(&to_mean) as u32];
+    let mut distances = vec![f32::INFINITY; n];
+    while chosen.len() < count.min(n) {
+        let last = points[chosen[chosen.len() - 1] as usize];
+        for (d, p) in distances.iter_mut().zip(points) {
+            *d = d.min(squared(p, &last));
+        }
+        chosen.push(farthest(&distances) as u32);
+    }
+    (0..count).map(|i| chosen[i % chosen.len()]).collect()
+}
+
+/// `count` points evenly spaced along a Morton curve through the cloud, `phase` in [0, 1) steps
+/// from its start: a subsample as dense as the cloud itself, that no single outlier dominates (as
+/// it would farthest point sampling). Repeats in turn where the cloud has fewer points.
+pub fn even_subsample(points: &[[f32; 3]], count: usize, phase: f32) -> Vec<u32> {
+    let n = points.len();
+    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for p in points {
+        for c in 0..3 {
+            low[c] = low[c].min(p[c]);
+            high[c] = high[c].max(p[c]);
+        }
+    }
+    let side = (0..3).map(|c| high[c] - low[c]).fold(f32::MIN_POSITIVE, f32::max);
+    let cell = |v: f32, c: usize| (((v - low[c]) / side) * 1023.0) as u32;
+    let mut order: Vec<(u32, u32)> = points
+        .iter()
+        .enumerate()
+        .map(|(i, p)| (morton(cell(p[0], 0), cell(p[1], 1), cell(p[2], 2)), i as u32))
+        .collect();
+    // Ties in a cell are broken by the coordinates, so that the order of the points plays no part.
+    order.sort_unstable_by(|a, b| {
+        a.0.cmp(&b.0).then_with(|| {
+            let (p, q) = (&points[a.1 as usize], &points[b.1 as usize]);
+            p[0].total_cmp(&q[0]).then(p[1].total_cmp(&q[1])).then(p[2].total_cmp(&q[2]))
+        })
+    });
+    let taken = count.min(n);
+    let step = n as f32 / taken as f32;
+    let chosen: Vec<u32> =
+        (0..taken).map(|i| order[(((i as f32 + phase) * step) as usize).min(n - 1)].1).collect();
+    (0..count).map(|i| chosen[i % taken]).collect()
+}
+
+/// Interleaves the low 10 bits of three numbers.
+fn morton(x: u32, y: u32, z: u32) -> u32 {
+    let spread = |v: u32| {
+        let mut v = v & 0x3ff;
+        v = (v | (v << 16)) & 0x0300_00ff;
+        v = (v | (v << 8)) & 0x0300_f00f;
+        v = (v | (v << 4)) & 0x030c_30c3;
+        (v | (v << 2)) & 0x0924_9249
+    };
+    spread(x) | (spread(y) << 1) | (spread(z) << 2)
+}
+
+/// The rows `indices` of `table`, shape `[rows, channels]` to `[indices.len(), channels]`.
+pub fn rows(table: Tensor<2>, indices: &[i64]) -> Tensor<2> {
+    let device = table.device().without_autodiff();
+    let indices = Tensor::<1, Int>::from_data(TensorData::new(indices.to_vec(), [indices.len()]), &device);
+    table.select(0, indices)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud(n: usize) -> Vec<[f32; 3]> {
+        (0..n).map(|i| { let s = i as f32; [(s * 1.3).sin(), (s * 0.7).cos(), (s * s * 0.11).sin()] }).collect()
+    }
+
+    #[test]
+    fn neighbours_agree_with_a_full_sort() {
+        let (queries, support) = (cloud(13), cloud(57));
+        let found = k_nearest(&queries, &support, 5);
+        for (q, row) in queries.iter().zip(found.chunks(5)) {
+            let mut order: Vec<u32> = (0..57).collect();
+            order.sort_by(|a, b| squared(q, &support[*a as usize]).total_cmp(&squared(q, &support[*b as usize])));
+            assert_eq!(row, &order[..5]);
+        }
+        let first: Vec<u32> = found.chunks(5).map(|row| row[0]).collect();
+        assert_eq!(first, nearest(&queries, &support));
+        assert_eq!(k_nearest(&queries[..1], &support[..2], 5).len(), 5);
+    }
+
+    #[test]
+    fn samples_do_not_depend_on_the_order() {
+        let points = cloud(101);
+        let mut turned = points.clone();
+        turned.reverse();
+        let coordinates = |points: &[[f32; 3]], chosen: Vec<u32>| -> Vec<[f32; 3]> {
+            chosen.into_iter().map(|i| points[i as usize]).collect()
+        };
+        let a = coordinates(&points, even_subsample(&points, 17, 0.5));
+        assert_eq!(a, coordinates(&turned, even_subsample(&turned, 17, 0.5)));
+        let a = coordinates(&points, farthest_points(&points, 17));
+        assert_eq!(a, coordinates(&turned, farthest_points(&turned, 17)));
+        let distinct: std::collections::HashSet<u32> = even_subsample(&points, 17, 0.0).into_iter().collect();
+        assert_eq!(distinct.len(), 17);
+        assert_eq!(even_subsample(&points[..3], 7, 0.5).len(), 7);
+    }
+}

@@ -1,0 +1,128 @@
+//! Transformation integration: inlier ratios, lambda, and the weighted fusion projected back to
+//! SO(3).
+
+use burn::tensor::{Tensor, TensorData};
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::{HostClouds, share_within};
+use crate::procrustes::{nearest_rotation, transform};
+
+/// Which points the inlier test of a branch looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InlierTest {
+    /// The paper's words: a correspondence `x_i -> yhat_i` is an inlier when
+    /// `|R x_i + t - yhat_i| < tau`. Soft matches shrink towards the centroid, more so where there
+    /// are more of them, so the ratios of the two branches are not on one scale.
+    SoftMatch,
+    /// The same test for both branches: a point of the full source cloud is an inlier when the
+    /// branch's pose brings it closer than `tau` to the target cloud.
+    Nearest,
+}
+
+/// How the two poses are blended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IntegrationConfig {
+    /// The inlier test.
+    pub test: InlierTest,
+    /// Inlier threshold of the dense branch, in network units (clouds of unit radius). RGM: 0.05.
+    pub dense_threshold: f64,
+    /// Inlier threshold of the skeleton branch, network units; its spacing is 4 times as wide.
+    pub skeleton_threshold: f64,
+    /// Lambda is `g_c^p / (g_c^p + g_s^p)` with this `p`; the paper's is 1.
+    pub sharpness: f64,
+}
+
+/// The fused pose and what it was made from.
+#[derive(Debug, Clone)]
+pub struct Fusion {
+    /// `R`, the blend projected back to SO(3): `[batch, 3, 3]`.
+    pub rotation: Tensor<3>,
+    /// `t`: `[batch, 3]`.
+    pub translation: Tensor<2>,
+    /// `gamma_c` of each pair.
+    pub dense_inlier_ratio: Vec<f64>,
+    /// `gamma_s` of each pair.
+    pub skeleton_inlier_ratio: Vec<f64>,
+    /// `lambda = gamma_c / (gamma_c + gamma_s)` of each pair, 0.5 where both are 0.
+    pub lambda: Vec<f64>,
+}
+
+/// A branch's pose with the correspondences it came from.
+pub struct BranchPose<'a> {
+    /// `[batch, 3, 3]`.
+    pub rotation: &'a Tensor<3>,
+    /// `[batch, 3]`.
+    pub translation: &'a Tensor<2>,
+    /// Points that were matched: `[batch, n, 3]`.
+    pub points: &'a Tensor<3>,
+    /// Their soft matches: `[batch, n, 3]`.
+    pub matches: &'a Tensor<3>,
+}
+
+impl IntegrationConfig {
+    /// `{R, t} = lambda {R_c, t_c} + (1 - lambda) {R_s, t_s}` for clouds centred on their means.
+    /// Lambda counts inliers, so it is a constant of the backward pass.
+    ///
+    /// # Shapes
+    /// - `source`, `target`: `[batch, points, 3]`
+    pub fn fuse(
+        &self,
+        dense: BranchPose<'_>,
+        skeleton: BranchPose<'_>,
+        source: &Tensor<3>,
+        target: &Tensor<3>,
+    ) -> Fusion {
+        let dense_inlier_ratio = self.inlier_ratio(&dense, self.dense_threshold, source, target);
+        let skeleton_inlier_ratio = self.inlier_ratio(&skeleton, self.skeleton_threshold, source, target);
+        let lambda: Vec<f64> = dense_inlier_ratio
+            .iter()
+            .zip(&skeleton_inlier_ratio)
+            .map(|(c, s)| (c.powf(self.sharpness), s.powf(self.sharpness)))
+            .map(|(c, s)| if c + s > 0.0 { c / (c + s) } else { 0.5 })
+            .collect();
+
+        let device = source.device().without_autodiff();
+        let weights = TensorData::new(lambda.clone(), [lambda.len(), 1]);
+        let weight = Tensor::<2>::from_data(weights, (&device, source.dtype()));
+        let blend = |a: Tensor<2>, b: Tensor<2>| a * weight.clone() + b * (-weight.clone() + 1.0);
+
+        let batch = lambda.len();
+        let rotation = blend(
+            dense.rotation.clone().reshape([batch, 9]),
+            skeleton.rotation.clone().reshape([batch, 9]),
+        );
+        // The projection is the exact weighted chordal mean of the two rotations.
+        let rotation = nearest_rotation(rotation.reshape([batch, 3, 3]));
+        let translation = blend(dense.translation.clone(), skeleton.translation.clone());
+        Fusion { rotation, translation, dense_inlier_ratio, skeleton_inlier_ratio, lambda }
+    }
+
+    /// `gamma = N_inlier / N` of each pair.
+    fn inlier_ratio(
+        &self,
+        branch: &BranchPose<'_>,
+        threshold: f64,
+        source: &Tensor<3>,
+        target: &Tensor<3>,
+    ) -> Vec<f64> {
+        let (rotation, translation) = (branch.rotation.clone().detach(), branch.translation.clone().detach());
+        match self.test {
+            InlierTest::SoftMatch => {
+                let moved = HostClouds::read(&transform(branch.points.clone().detach(), rotation, translation));
+                let matches = HostClouds::read(&branch.matches.clone().detach());
+                let near = |a: &[f32; 3], b: &[f32; 3]| {
+                    (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>() < threshold * threshold
+                };
+                let count = |a: &[[f32; 3]], b: &[[f32; 3]]| a.iter().zip(b).filter(|(a, b)| near(a, b)).count();
+                moved.iter().zip(matches.iter()).map(|(a, b)| count(a, b) as f64 / a.len() as f64).collect()
+            }
+            InlierTest::Nearest => {
+                let moved = HostClouds::read(&transform(source.clone().detach(), rotation, translation));
+                let target = HostClouds::read(target);
+                moved.iter().zip(target.iter()).map(|(a, b)| share_within(a, b, threshold as f32)).collect()
+            }
+        }
+    }
+}

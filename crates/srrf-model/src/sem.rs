@@ -1,0 +1,241 @@
+//! SEM, the skeleton extraction module: set-abstraction encoder, weight head, convex combination
+//! (Eq. 5) and radii (Eq. 6).
+
+use burn::module::Module;
+use burn::nn::{LayerNorm, LayerNormConfig, Linear, LinearConfig};
+use burn::tensor::activation::{relu, softmax};
+use burn::tensor::{Device, Tensor};
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::{HostClouds, farthest_points, flat_indices, k_nearest, nearest, rows};
+
+/// Sizes of one set-abstraction level.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LevelConfig {
+    /// Points kept by farthest point sampling.
+    pub points: usize,
+    /// Nearest neighbours that are grouped. Point2Skeleton groups 16 to 128 within radii.
+    pub neighbours: usize,
+    /// Widths of the shared MLP.
+    pub widths: Vec<usize>,
+}
+
+/// Sizes of the skeleton extraction module.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SemConfig {
+    /// The set-abstraction levels of the encoder. Point2Skeleton: 1024, 768, 512, 512 points.
+    pub levels: Vec<LevelConfig>,
+    /// Width of the cloud's global feature, which joins each point's feature before the head.
+    pub global: usize,
+    /// Widths of the weight head. Point2Skeleton: 384, 256, 256, 128.
+    pub head: Vec<usize>,
+    /// Skeleton points, the paper's N_X. Point2Skeleton: 100.
+    pub skeleton_points: usize,
+    /// Factor on the logits before the softmax. At 1 every skeleton point sits near the centroid
+    /// for hundreds of steps (Point2Skeleton has a BatchNorm there instead).
+    pub logit_scale: f64,
+}
+
+impl SemConfig {
+    /// A new module.
+    pub fn init(&self, device: &Device) -> Sem {
+        let mut channels = 0;
+        let mut levels = Vec::new();
+        for level in &self.levels {
+            levels.push(Level {
+                mlp: mlp(3 + channels, &level.widths, device),
+                points: level.points,
+                neighbours: level.neighbours,
+            });
+            channels = level.widths.last().copied().unwrap_or(channels);
+        }
+        let mut head = Vec::new();
+        let mut width = 3 + channels + self.global;
+        for &next in &self.head {
+            head.push(HeadLayer {
+                linear: LinearConfig::new(width, next).init(device),
+                norm: LayerNormConfig::new(next).init(device),
+            });
+            width = next;
+        }
+        Sem {
+            levels,
+            global: LinearConfig::new(channels, self.global).init(device),
+            head,
+            weights: LinearConfig::new(width, self.skeleton_points).init(device),
+            logit_scale: self.logit_scale,
+        }
+    }
+}
+
+/// A stack of linear layers `channels -> widths[0] -> ..`.
+fn mlp(channels: usize, widths: &[usize], device: &Device) -> Vec<Linear> {
+    let inputs = std::iter::once(channels).chain(widths.iter().copied());
+    inputs.zip(widths).map(|(input, &output)| LinearConfig::new(input, output).init(device)).collect()
+}
+
+/// One set-abstraction level.
+#[derive(Module, Debug)]
+struct Level {
+    mlp: Vec<Linear>,
+    points: usize,
+    neighbours: usize,
+}
+
+/// Linear, LayerNorm, ReLU.
+#[derive(Module, Debug)]
+struct HeadLayer {
+    linear: Linear,
+    norm: LayerNorm,
+}
+
+/// The skeleton extraction module; one set of weights for both clouds.
+#[derive(Module, Debug)]
+pub struct Sem {
+    levels: Vec<Level>,
+    global: Linear,
+    head: Vec<HeadLayer>,
+    weights: Linear,
+    logit_scale: f64,
+}
+
+/// The skeleton of each cloud.
+#[derive(Debug, Clone)]
+pub struct Skeleton {
+    /// Skeleton points `S`: `[clouds, skeleton_points, 3]`.
+    pub points: Tensor<3>,
+    /// Radii of their spheres, `R = W^T D`: `[clouds, skeleton_points]`.
+    pub radii: Tensor<2>,
+    /// Convex weights `W`, each column sums to 1: `[clouds, samples, skeleton_points]`.
+    pub weights: Tensor<3>,
+    /// The sampled points `X*`: `[clouds, samples, 3]`.
+    pub samples: Tensor<3>,
+}
+
+impl Sem {
+    /// Extracts the skeletons of centred clouds.
+    ///
+    /// # Shapes
+    /// - `clouds`: `[clouds, points, 3]`
+    pub fn forward(&self, clouds: Tensor<3>) -> Skeleton {
+        let (samples, features) = self.encode(clouds);
+        let [batch, n, channels] = features.dims();
+
+        // The head sees each point's feature, the cloud's, and where the point is.
+        let global = relu(self.global.forward(features.clone())).max_dim(1); // [batch, 1, global]
+        let [_, _, global_width] = global.dims();
+        let mut x = Tensor::cat(vec![samples.clone(), features, global.expand([batch, n, global_width])], 2)
+            .reshape([batch * n, 3 + channels + global_width]);
+        for layer in &self.head {
+            x = relu(layer.norm.forward(layer.linear.forward(x)));
+        }
+        let logits = self.weights.forward(x) * self.logit_scale; // [batch * n, skeleton_points]
+        let [_, skeleton_points] = logits.dims();
+        let weights = softmax(logits.reshape([batch, n, skeleton_points]), 1); // sum_i W(i, j) = 1
+
+        let points = weights.clone().transpose().matmul(samples.clone()); // S = W^T X*, Eq. (5)
+        let distances = nearest_distance(samples.clone(), points.clone()); // D, Eq. (6)
+        let radii = weights.clone().transpose().matmul(distances.unsqueeze_dim::<3>(2)); // R = W^T D
+        Skeleton { points, radii: radii.squeeze_dim::<2>(2), weights, samples }
+    }
+
+    /// The sampled points `X*` and their contextual features.
+    fn encode(&self, clouds: Tensor<3>) -> (Tensor<3>, Tensor<3>) {
+        let [batch, mut n, _] = clouds.dims();
+        let mut host = HostClouds::read(&clouds);
+        let mut xyz = clouds.reshape([batch * n, 3]);
+        let mut features: Option<Tensor<2>> = None;
+        for level in &self.levels {
+            // Farthest point sampling, unless every point is kept.
+            let samples = level.points.min(n);
+            let (centres, host_centres) = if samples < n {
+                let chosen = flat_indices(host.iter(), n, |_, cloud| farthest_points(cloud, samples));
+                (rows(xyz.clone(), &chosen), host.select(&chosen, samples))
+            } else {
+                (xyz.clone(), host.clone())
+            };
+            let supports: Vec<_> = host.iter().collect();
+            let neighbours =
+                flat_indices(host_centres.iter(), n, |i, centre| k_nearest(centre, supports[i], level.neighbours));
+            let grouped = level.group(xyz, features, centres.clone(), &neighbours);
+            (xyz, features, host, n) = (centres, Some(grouped), host_centres, samples);
+        }
+        let features = features.unwrap_or_else(|| xyz.clone());
+        let [_, channels] = features.dims();
+        (xyz.reshape([batch, n, 3]), features.reshape([batch, n, channels]))
+    }
+}
+
+impl Level {
+    /// Shared MLP on `[x_j - x_i; f_j]` over the neighbours `j` of each centre `i`, then the
+    /// maximum over them.
+    ///
+    /// The first linear layer is folded through the gather: it runs once on each support point,
+    /// and the centre's share is subtracted after the rows are gathered.
+    ///
+    /// # Shapes
+    /// - `xyz`: `[rows, 3]`, `features`: `[rows, channels]`, `centres`: `[samples, 3]`,
+    ///   `neighbours`: `samples * k` row numbers
+    /// - output: `[samples, width]`
+    fn group(
+        &self,
+        xyz: Tensor<2>,
+        features: Option<Tensor<2>>,
+        centres: Tensor<2>,
+        neighbours: &[i64],
+    ) -> Tensor<2> {
+        let [samples, _] = centres.dims();
+        let input = match features {
+            Some(features) => Tensor::cat(vec![xyz, features], 1),
+            None => xyz,
+        };
+        let Some((first, others)) = self.mlp.split_first() else { return centres };
+        let xyz_weight = first.weight.val().narrow(0, 0, 3); // the rows that act on x_j - x_i
+        let table = first.forward(input);
+        let [_, width] = table.dims();
+        let shift = centres.matmul(xyz_weight).unsqueeze_dim::<3>(1); // [samples, 1, width]
+        let grouped = rows(table, neighbours).reshape([samples, self.neighbours, width]);
+        let mut x = relu(grouped - shift).reshape([samples * self.neighbours, width]);
+        for layer in others {
+            x = relu(layer.forward(x));
+        }
+        let [_, width] = x.dims();
+        x.reshape([samples, self.neighbours, width]).max_dim(1).squeeze_dim::<2>(1)
+    }
+}
+
+/// Distance from each of `points` to the nearest of `support`, differentiable in both. The nearest
+/// one is found on the host; the distance is floored at 1e-6, so that its gradient stays finite.
+///
+/// # Shapes
+/// - `points`: `[clouds, n, 3]`, `support`: `[clouds, m, 3]`
+/// - output: `[clouds, n]`
+pub fn nearest_distance(points: Tensor<3>, support: Tensor<3>) -> Tensor<2> {
+    let [clouds, n, _] = points.dims();
+    let nearest = nearest_rows(&points, &support);
+    let [_, m, _] = support.dims();
+    let matched = rows(support.reshape([clouds * m, 3]), &nearest);
+    distance(points.reshape([clouds * n, 3]) - matched).reshape([clouds, n])
+}
+
+/// Row numbers, in the flattened support, of the nearest support point of each point.
+pub(crate) fn nearest_rows(points: &Tensor<3>, support: &Tensor<3>) -> Vec<i64> {
+    let [_, m, _] = support.dims();
+    let (points, support) = (HostClouds::read(points), HostClouds::read(support));
+    let supports: Vec<_> = support.iter().collect();
+    flat_indices(points.iter(), m, |i, cloud| nearest(cloud, supports[i]))
+}
+
+/// Norm of each row, floored at 1e-6. Shape `[rows, 3]` to `[rows]`.
+pub(crate) fn distance(difference: Tensor<2>) -> Tensor<1> {
+    difference.square().sum_dim(1).squeeze_dim::<1>(1).clamp_min(1e-12).sqrt()
+}
+
+impl Skeleton {
+    /// The skeleton points, cut off from the gradient of the module that made them.
+    pub fn detached_points(&self) -> Tensor<3> {
+        self.points.clone().detach()
+    }
+}

@@ -1,0 +1,105 @@
+//! SFE, the structural feature extractor: local feature integration (LFI) over `k` neighbours and
+//! post-norm transformer layers, fused by concatenation.
+
+use burn::module::Module;
+use burn::nn::{LayerNorm, LayerNormConfig, Linear, LinearConfig};
+use burn::tensor::activation::relu;
+use burn::tensor::{Device, Tensor};
+use serde::{Deserialize, Serialize};
+
+use crate::attention::EncoderLayer;
+use crate::geometry::{HostClouds, flat_indices, k_nearest, rows};
+
+/// Sizes of the structural feature extractor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SfeConfig {
+    /// Number of LFI + transformer layers, the paper's N_l. DIT, the design's ancestor, uses 8.
+    pub layers: usize,
+    /// Neighbours that LFI joins, the point itself included. DIT uses 20.
+    pub neighbours: usize,
+    /// Width of the features inside. DIT uses 64.
+    pub width: usize,
+    /// Attention heads; must divide `width`. DIT uses 4.
+    pub heads: usize,
+    /// Width inside the MLP of a transformer layer. DIT uses 64.
+    pub mlp: usize,
+}
+
+impl SfeConfig {
+    /// Channels of the fused feature: `layers * width`.
+    pub fn output_width(&self) -> usize {
+        self.layers * self.width
+    }
+
+    /// A new extractor.
+    pub fn init(&self, device: &Device) -> Sfe {
+        let layer = |index| SfeLayer {
+            join: LinearConfig::new(self.neighbours * if index == 0 { 3 } else { self.width }, self.width)
+                .init(device),
+            encoder: EncoderLayer::new(self.width, self.heads, self.mlp, device),
+        };
+        Sfe {
+            layers: (0..self.layers).map(layer).collect(),
+            norm: LayerNormConfig::new(self.output_width()).init(device),
+            neighbours: self.neighbours,
+        }
+    }
+}
+
+/// One LFI and one transformer layer.
+#[derive(Module, Debug)]
+struct SfeLayer {
+    /// `k * C -> width`, which makes the residual of the transformer layer possible: the paper
+    /// adds `MSA(T')` to `T'`, whose widths differ.
+    join: Linear,
+    encoder: EncoderLayer,
+}
+
+/// The structural feature extractor.
+#[derive(Module, Debug)]
+pub struct Sfe {
+    layers: Vec<SfeLayer>,
+    norm: LayerNorm,
+    neighbours: usize,
+}
+
+impl Sfe {
+    /// Features of `tokens`. The first LFI joins the coordinates of the neighbours in the whole
+    /// `cloud`, the later ones the features of the neighbours among the tokens.
+    ///
+    /// # Shapes
+    /// - `tokens`: `[clouds, n, 3]`, `cloud`: `[clouds, points, 3]` (the same tensor where every
+    ///   point is a token)
+    /// - output: `[clouds, n, layers * width]`
+    pub fn forward(&self, tokens: Tensor<3>, cloud: Tensor<3>) -> Tensor<3> {
+        let [clouds, n, _] = tokens.dims();
+        let [_, points, _] = cloud.dims();
+        let (host_tokens, host_cloud) = (HostClouds::read(&tokens), HostClouds::read(&cloud));
+        let k = self.neighbours;
+        let neighbours = |support: &HostClouds, support_points: usize| {
+            let supports: Vec<_> = support.iter().collect();
+            flat_indices(host_tokens.iter(), support_points, |i, tokens| k_nearest(tokens, supports[i], k))
+        };
+        let in_cloud = neighbours(&host_cloud, points);
+        let in_tokens = neighbours(&host_tokens, n);
+
+        let mut table = cloud.reshape([clouds * points, 3]);
+        let mut indices = &in_cloud;
+        let mut outputs = Vec::with_capacity(self.layers.len());
+        for layer in &self.layers {
+            let [_, channels] = table.dims();
+            // T'_n = Concat(T^1 .. T^k) over the neighbours.
+            let joined = rows(table, indices).reshape([clouds * n, k * channels]);
+            let joined = layer.join.forward(joined); // [clouds * n, width]
+            let [_, width] = joined.dims();
+            // That = LN(MSA(T') + T'), T_{n+1} = LN(MLP(That) + That).
+            let features = layer.encoder.forward(joined.reshape([clouds, n, width]));
+            outputs.push(features.clone());
+            table = features.reshape([clouds * n, width]);
+            indices = &in_tokens;
+        }
+        // F = LN(ReLU(Concat(F_2 .. F_{N_l + 1}))).
+        self.norm.forward(relu(Tensor::cat(outputs, 2)))
+    }
+}

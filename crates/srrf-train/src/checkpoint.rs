@@ -1,0 +1,168 @@
+//! Checkpoints: parameters, optimiser and position in one file, written aside and renamed, so that
+//! a run that is killed at any moment goes on from the last one with the same result.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+use burn::module::Module;
+use burn::optim::ModuleOptimizer;
+use burn::tensor::{Bytes, Device};
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde::{Deserialize, Serialize};
+use srrf_model::weights::{WeightsError, parameters, with_parameters, write_atomically};
+use srrf_model::{Srrf, init};
+
+use crate::config::TrainConfig;
+
+/// Name of the checkpoint in the run's folder.
+pub const FILE: &str = "checkpoint.safetensors";
+
+/// Why a checkpoint could not be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    /// The file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WeightsError),
+    /// The file cannot be read.
+    #[error("{path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        source: std::io::Error,
+    },
+    /// The file is no checkpoint, or a broken one.
+    #[error("{path}: not a usable checkpoint: {why}; remove it to start over")]
+    Broken {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        why: String,
+    },
+    /// The checkpoint belongs to another configuration.
+    #[error("{path}: made by another configuration ({why}); use another --run folder, or remove it to start over")]
+    OtherConfig {
+        /// The file.
+        path: PathBuf,
+        /// What differs.
+        why: String,
+    },
+}
+
+/// Where a run stands, beside its parameters.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Progress {
+    /// Steps done.
+    pub step: usize,
+    /// Steps left out because a loss or gradient was not finite.
+    pub skipped: usize,
+    /// How many of the last steps in a row were left out.
+    pub skipped_in_a_row: usize,
+    /// Best validation value so far.
+    pub best: Option<f64>,
+    /// Seconds of wall time in all sessions.
+    pub wall_seconds: f64,
+    /// Seconds of processor time in all sessions.
+    pub cpu_seconds: f64,
+}
+
+/// Writes the checkpoint of `folder`.
+///
+/// # Errors
+/// [`CheckpointError::Write`]; the old checkpoint is then unharmed.
+pub fn save(
+    folder: &Path,
+    config: &TrainConfig,
+    model: &Srrf,
+    optimizer: &ModuleOptimizer,
+    progress: &Progress,
+) -> Result<(), CheckpointError> {
+    let path = folder.join(FILE);
+    let broken = |why: String| CheckpointError::Broken { path: path.clone(), why };
+    let mut tensors: Vec<(String, Dtype, Vec<usize>, Vec<u8>)> = parameters(model)
+        .into_iter()
+        .map(|(name, (shape, values))| {
+            let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            (format!("model.{name}"), Dtype::F32, shape, bytes)
+        })
+        .collect();
+    let state = optimizer.into_bytes().map_err(|e| broken(e.to_string()))?;
+    tensors.push(("optimizer".into(), Dtype::U8, vec![state.len()], state.to_vec()));
+    let views = tensors
+        .iter()
+        .map(|(name, dtype, shape, bytes)| Ok((name.as_str(), TensorView::new(*dtype, shape.clone(), bytes)?)))
+        .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()
+        .map_err(|e| broken(e.to_string()))?;
+    let json = |value: Result<String, serde_json::Error>| value.map_err(|e| broken(e.to_string()));
+    let header = HashMap::from([
+        ("progress".to_string(), json(serde_json::to_string(progress))?),
+        ("config".to_string(), json(serde_json::to_string(config))?),
+    ]);
+    let bytes = safetensors::serialize(views, Some(header)).map_err(|e| broken(e.to_string()))?;
+    write_atomically(&path, &bytes)?;
+    Ok(())
+}
+
+/// Reads the checkpoint of `folder`, if there is one.
+///
+/// # Errors
+/// [`CheckpointError`] for broken files and for checkpoints of another configuration.
+pub fn load(
+    folder: &Path,
+    config: &TrainConfig,
+    optimizer: ModuleOptimizer,
+    device: &Device,
+) -> Result<Option<(Srrf, ModuleOptimizer, Progress)>, CheckpointError> {
+    let path = folder.join(FILE);
+    let bytes = match std::fs::read(&path) {
+        Ok(bytes) => bytes,
+        Err(source) if source.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(source) => return Err(CheckpointError::Read { path, source }),
+    };
+    let broken = |why: String| CheckpointError::Broken { path: path.clone(), why };
+    let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| broken(e.to_string()))?;
+    let header = header.metadata().clone().unwrap_or_default();
+    let entry = |key: &str| header.get(key).ok_or_else(|| broken(format!("no `{key}` in its header")));
+    let progress: Progress = serde_json::from_str(entry("progress")?).map_err(|e| broken(e.to_string()))?;
+    let saved: serde_json::Value = serde_json::from_str(entry("config")?).map_err(|e| broken(e.to_string()))?;
+    let wanted = serde_json::to_value(config).map_err(|e| broken(e.to_string()))?;
+    if let Some(key) = first_difference(&saved, &wanted, String::new()) {
+        return Err(CheckpointError::OtherConfig { path, why: format!("`{key}` differs") });
+    }
+
+    let mut values = BTreeMap::new();
+    let mut state = None;
+    for (name, view) in SafeTensors::deserialize(&bytes).map_err(|e| broken(e.to_string()))?.tensors() {
+        if let Some(name) = name.strip_prefix("model.") {
+            let data = view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+            values.insert(name.to_string(), (view.shape().to_vec(), data));
+        } else if name == "optimizer" {
+            state = Some(Bytes::from_bytes_vec(view.data().to_vec()));
+        }
+    }
+    let state = state.ok_or_else(|| broken("no optimiser state in it".into()))?;
+    let model = init::seeded(config.network.init(device), config.seed);
+    let model = with_parameters(model, values).map_err(|(name, why)| broken(format!("`{name}`: {why}")))?;
+    let optimizer = optimizer.from_bytes(state).map_err(|e| broken(e.to_string()))?;
+    Ok(Some((model.valid(), optimizer, progress)))
+}
+
+/// Path of the first entry in which two JSON values differ.
+fn first_difference(a: &serde_json::Value, b: &serde_json::Value, at: String) -> Option<String> {
+    use serde_json::Value::{Array, Object};
+    match (a, b) {
+        (Object(a), Object(b)) => a
+            .keys()
+            .chain(b.keys())
+            .find_map(|k| {
+                let null = serde_json::Value::Null;
+                first_difference(a.get(k).unwrap_or(&null), b.get(k).unwrap_or(&null), format!("{at}.{k}"))
+            })
+            .map(|path| path.trim_start_matches('.').to_string()),
+        (Array(a), Array(b)) if a.len() == b.len() => {
+            a.iter().zip(b).enumerate().find_map(|(i, (a, b))| first_difference(a, b, format!("{at}[{i}]")))
+        }
+        _ => (a != b).then_some(at),
+    }
+}

@@ -1,0 +1,355 @@
+//! The training loop.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use burn::module::Module;
+use burn::optim::decay::WeightDecayConfig;
+use burn::optim::{AdamConfig, AdamWConfig, ModuleOptimizer};
+use burn::tensor::Device;
+use srrf_cloud::ShapeSource;
+use srrf_corrupt::{Pair, Severity};
+use srrf_model::weights::{to_safetensors, write_atomically};
+use srrf_model::{Srrf, init};
+
+use crate::checkpoint::{self, CheckpointError, Progress};
+use crate::config::{OptimizerConfig, OptimizerKind, TrainConfig};
+use crate::data::PairSource;
+use crate::log::{Log, progress_bar};
+use crate::resources::cpu_seconds;
+use crate::schedule::Plan;
+use crate::step::{Losses, StepContext, StepError, Workers, gradient, scale};
+use crate::validate::{ValidateError, Validation, validate};
+
+/// Steps between two lines of the log.
+const LOG_EVERY: usize = 10;
+/// The run stops when this many steps in a row are not finite.
+const MOST_SKIPPED_IN_A_ROW: usize = 20;
+
+/// Why a run stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A file of the run cannot be written.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        source: std::io::Error,
+    },
+    /// The checkpoint cannot be written or read.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// The weights cannot be written.
+    #[error(transparent)]
+    Weights(#[from] srrf_model::weights::WeightsError),
+    /// A step could not be made.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// A validation failed.
+    #[error(transparent)]
+    Validate(#[from] ValidateError),
+    /// No thread could be started.
+    #[error("no worker thread could be started: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// Losses or gradients stay non-finite.
+    #[error(
+        "the loss or its gradient was not finite in {0} steps in a row; the last checkpoint is from before. \
+         Lower `learning_rate` or `optimizer.clip_norm`"
+    )]
+    NotFinite(usize),
+    /// There is a checkpoint, and no word on what to do with it.
+    #[error("{path} holds a run that stands at step {step}; add --resume to go on, or --restart to start over")]
+    Exists {
+        /// The folder.
+        path: PathBuf,
+        /// Where the run stands.
+        step: usize,
+    },
+}
+
+/// What to do with a checkpoint that is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Existing {
+    /// Go on from it.
+    Resume,
+    /// Start over.
+    Restart,
+    /// Stop with [`RunError::Exists`].
+    Refuse,
+}
+
+/// Options that change how far and how fast a run goes, not what it computes.
+pub struct RunOptions {
+    /// Folder of the run.
+    pub folder: PathBuf,
+    /// Worker threads.
+    pub threads: usize,
+    /// What to do with a checkpoint that is there.
+    pub existing: Existing,
+    /// Stop after this many steps, counted from the start of the run.
+    pub until_step: Option<usize>,
+    /// Stop after this time.
+    pub time_limit: Option<Duration>,
+}
+
+/// How a call ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ended {
+    /// Steps done since the start of the run.
+    pub step: usize,
+    /// Whether the run is complete.
+    pub complete: bool,
+    /// Steps left out.
+    pub skipped: usize,
+    /// Where the best weights are, if there were any yet.
+    pub best: Option<PathBuf>,
+}
+
+/// The optimiser of a configuration.
+fn optimizer(config: &OptimizerConfig) -> ModuleOptimizer {
+    let (beta_2, decay) = (config.beta_2 as f32, config.weight_decay as f32);
+    match config.kind {
+        OptimizerKind::Adam => {
+            let adam = AdamConfig::new().with_beta_2(beta_2).with_epsilon(1e-8);
+            adam.with_weight_decay((decay > 0.0).then(|| WeightDecayConfig::new(decay))).init()
+        }
+        OptimizerKind::Adamw => {
+            AdamWConfig::new().with_beta_2(beta_2).with_epsilon(1e-8).with_weight_decay(decay).init()
+        }
+    }
+}
+
+/// Everything a run holds while it goes.
+struct Run<'a> {
+    config: &'a TrainConfig,
+    options: &'a RunOptions,
+    device: Device,
+    pairs: PairSource,
+    held_out: Vec<Pair>,
+    workers: Workers,
+    plan: Plan,
+    model: Srrf,
+    optimizer: ModuleOptimizer,
+    progress: Progress,
+    log: Log,
+    started: (Instant, f64, f64, f64),
+}
+
+/// Trains, from the start or from the checkpoint, until done, told to stop, or out of time.
+///
+/// # Errors
+/// [`RunError`]; the last checkpoint stays usable.
+pub fn run(
+    config: &TrainConfig,
+    options: &RunOptions,
+    shapes: Box<dyn ShapeSource>,
+    device: Device,
+    stop: &AtomicBool,
+) -> Result<Ended, RunError> {
+    let mut run = Run::open(config, options, shapes, device)?;
+    let end = options.until_step.unwrap_or(usize::MAX).min(run.plan.steps());
+    let bar = progress_bar(run.plan.steps(), run.progress.step);
+    let mut window = (Losses::new(), 0);
+    let mut saved = Instant::now();
+    while run.progress.step < end && !stop.load(Ordering::Relaxed) && !run.out_of_time() {
+        let step = run.progress.step;
+        let stage = &config.stages[run.plan.stage(step)];
+        let rate = run.plan.learning_rate(stage, step);
+        let losses = run.step(step, rate)?;
+        run.progress.step = step + 1;
+
+        let epoch = run.plan.epochs(step + 1);
+        merge(&mut window, losses);
+        if (step + 1).is_multiple_of(LOG_EVERY) {
+            let losses = mean(&mut window);
+            bar.set_message(message(&stage.name, epoch, rate, &losses, config.optimizer.batch, &bar));
+            run.log.train(step + 1, epoch, &stage.name, rate, &losses).map_err(|e| run.io(e))?;
+        }
+        let last = step + 1 == run.plan.steps();
+        if stage.registration && ((step + 1).is_multiple_of(run.plan.steps_in(config.keep.validate_epochs)) || last) {
+            let result = run.validate()?;
+            bar.println(summary(step + 1, epoch, &result));
+        }
+        bar.set_position(run.progress.step as u64);
+        let epochs = config.keep.checkpoint_epochs;
+        let due = epochs > 0.0 && (step + 1).is_multiple_of(run.plan.steps_in(epochs));
+        if due || last || saved.elapsed().as_secs_f64() > config.keep.checkpoint_minutes * 60.0 {
+            run.save()?;
+            saved = Instant::now();
+        }
+    }
+    run.save()?;
+    bar.abandon();
+    let best = options.folder.join("best.safetensors");
+    let complete = run.progress.step == run.plan.steps();
+    let best = best.exists().then_some(best);
+    Ok(Ended { step: run.progress.step, complete, skipped: run.progress.skipped, best })
+}
+
+impl<'a> Run<'a> {
+    fn open(
+        config: &'a TrainConfig,
+        options: &'a RunOptions,
+        shapes: Box<dyn ShapeSource>,
+        device: Device,
+    ) -> Result<Self, RunError> {
+        let folder = &options.folder;
+        let io = |path: &Path, source| RunError::Io { path: path.to_path_buf(), source };
+        std::fs::create_dir_all(folder).map_err(|e| io(folder, e))?;
+        if options.existing == Existing::Restart {
+            for name in [checkpoint::FILE, crate::log::FILE, "best.safetensors", "last.safetensors"] {
+                let _ = std::fs::remove_file(folder.join(name));
+            }
+        }
+        let found = checkpoint::load(folder, config, optimizer(&config.optimizer), &device)?;
+        let (model, optimizer, progress) = match found {
+            Some((_, _, progress)) if options.existing == Existing::Refuse => {
+                return Err(RunError::Exists { path: folder.clone(), step: progress.step });
+            }
+            Some(found) => found,
+            None => {
+                let model = init::seeded(config.network.init(&device), config.seed).valid();
+                (model, optimizer(&config.optimizer), Progress::default())
+            }
+        };
+        let path = folder.join("config.toml");
+        let text = toml::to_string(config).map_err(|e| io(&path, std::io::Error::other(e)))?;
+        write_atomically(&path, text.as_bytes())?;
+
+        let pairs = PairSource::new(config, shapes);
+        let severity = Severity::try_from(config.keep.validate_severity).unwrap_or(Severity::ALL[2]);
+        let held_out = pairs.validation(severity).map_err(StepError::from)?;
+        let plan = Plan::new(config, pairs.len());
+        let log = Log::open(folder, progress.step).map_err(|e| io(folder, e))?;
+        let workers = Workers::new(options.threads)?;
+        let started = (Instant::now(), progress.wall_seconds, cpu_seconds(), progress.cpu_seconds);
+        Ok(Self { config, options, device, pairs, held_out, workers, plan, model, optimizer, progress, log, started })
+    }
+
+    fn out_of_time(&self) -> bool {
+        self.options.time_limit.is_some_and(|limit| self.started.0.elapsed() >= limit)
+    }
+
+    /// One step: gradient, check, clip, update.
+    fn step(&mut self, step: usize, rate: f64) -> Result<Losses, RunError> {
+        let config = self.config;
+        let context = StepContext {
+            stage: &config.stages[self.plan.stage(step)],
+            losses: &config.losses,
+            integration: &config.network.integration,
+            pairs: &self.pairs,
+            device: &self.device,
+            batch: config.optimizer.batch,
+            shard: config.optimizer.shard,
+        };
+        let mut outcome = gradient(&context, &self.model, step, &self.workers)?;
+        if !outcome.norm.is_finite() {
+            self.progress.skipped += 1;
+            self.progress.skipped_in_a_row += 1;
+            if self.progress.skipped_in_a_row >= MOST_SKIPPED_IN_A_ROW {
+                return Err(RunError::NotFinite(self.progress.skipped_in_a_row));
+            }
+            return Ok(Losses::new());
+        }
+        self.progress.skipped_in_a_row = 0;
+        let clip = config.optimizer.clip_norm;
+        if clip > 0.0 && outcome.norm > clip {
+            scale(&self.model, &mut outcome.gradients, clip / outcome.norm);
+        }
+        self.model = self.optimizer.step(rate, self.model.clone(), outcome.gradients);
+        outcome.losses.insert("gradient_norm", outcome.norm);
+        Ok(outcome.losses)
+    }
+
+    fn validate(&mut self) -> Result<Validation, RunError> {
+        let integration = &self.config.network.integration;
+        let result = validate(&self.model, integration, &self.held_out, &self.device, &self.workers)?;
+        let step = self.progress.step;
+        self.log.validation(step, self.plan.epochs(step), &result).map_err(|e| self.io(e))?;
+        let value = result.scores["fused"].rmse_r;
+        if self.progress.best.is_none_or(|best| value < best) {
+            self.progress.best = Some(value);
+            self.export("best.safetensors", Some(&result))?;
+        }
+        Ok(result)
+    }
+
+    /// Checkpoint, last weights, picture.
+    fn save(&mut self) -> Result<(), RunError> {
+        let (start, wall, cpu_start, cpu) = self.started;
+        self.progress.wall_seconds = wall + start.elapsed().as_secs_f64();
+        self.progress.cpu_seconds = cpu + cpu_seconds() - cpu_start;
+        checkpoint::save(&self.options.folder, self.config, &self.model, &self.optimizer, &self.progress)?;
+        self.export("last.safetensors", None)?;
+        self.log.draw().map_err(|e| self.io(std::io::Error::other(e)))
+    }
+
+    /// Weights in half precision, with what is known of them in the header.
+    fn export(&self, file: &str, validation: Option<&Validation>) -> Result<(), RunError> {
+        let (start, wall, cpu_start, cpu) = self.started;
+        let mut notes = BTreeMap::from([
+            ("data".to_string(), self.pairs.description()),
+            ("seed".to_string(), self.config.seed.to_string()),
+            ("steps".to_string(), self.progress.step.to_string()),
+            ("pairs".to_string(), (self.progress.step * self.config.optimizer.batch).to_string()),
+            ("wall_seconds".to_string(), format!("{:.0}", wall + start.elapsed().as_secs_f64())),
+            ("cpu_seconds".to_string(), format!("{:.0}", cpu + cpu_seconds() - cpu_start)),
+            ("version".to_string(), env!("CARGO_PKG_VERSION").to_string()),
+        ]);
+        for (name, s) in validation.iter().flat_map(|v| &v.scores) {
+            let text = format!("RMSE(R) {:.3}, MAE(R) {:.3}, median {:.3} deg", s.rmse_r, s.mae_r, s.median_rot_deg);
+            notes.insert(format!("validation_{name}"), text);
+        }
+        let bytes = to_safetensors(&self.model, &self.config.network, &self.config.name, &notes)?;
+        write_atomically(&self.options.folder.join(file), &bytes)?;
+        Ok(())
+    }
+
+    fn io(&self, source: std::io::Error) -> RunError {
+        RunError::Io { path: self.options.folder.clone(), source }
+    }
+}
+
+fn merge((sums, count): &mut (Losses, usize), losses: Losses) {
+    *count += usize::from(!losses.is_empty());
+    for (name, value) in losses {
+        *sums.entry(name).or_insert(0.0) += value;
+    }
+}
+
+fn mean(window: &mut (Losses, usize)) -> Losses {
+    let (sums, count) = std::mem::take(window);
+    sums.into_iter().map(|(name, sum)| (name, sum / count.max(1) as f64)).collect()
+}
+
+fn message(
+    stage: &str,
+    epoch: f64,
+    rate: f64,
+    losses: &Losses,
+    batch: usize,
+    bar: &indicatif::ProgressBar,
+) -> String {
+    let total = losses.get("total").copied().unwrap_or(f64::NAN);
+    let pairs = bar.per_sec() * batch as f64;
+    format!("{stage}  epoch {epoch:.2}  loss {total:.4}  lr {rate:.1e}  {pairs:.1} pairs/s")
+}
+
+fn summary(step: usize, epoch: f64, result: &Validation) -> String {
+    let row = |name: &str| {
+        let s = &result.scores[name];
+        format!("{name} {:.2}/{:.2}/{:.2}", s.rmse_r, s.mae_r, s.median_rot_deg)
+    };
+    format!(
+        "step {step}, epoch {epoch:.2}: RMSE/MAE/median of R in degrees: {}, {}, {}; skeleton d {:.3}, spread {:.3}",
+        row("dense"),
+        row("skeleton"),
+        row("fused"),
+        result.skeleton_chamfer,
+        result.skeleton_spread
+    )
+}
