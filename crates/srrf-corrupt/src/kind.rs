@@ -76,6 +76,22 @@ impl CorruptionKind {
             Self::DistortionRbfInv => "distortion_rbf_inv",
         }
     }
+
+    /// Whether ModelNet40-C ends this corruption with [`box_normalize`](crate::box_normalize). No
+    /// corruption here does so itself; it is an option of pair synthesis.
+    pub fn is_box_normalized(self) -> bool {
+        match self {
+            Self::DensityInc | Self::DensityDec | Self::Cutout | Self::Gaussian => false,
+            Self::Uniform
+            | Self::Background
+            | Self::Impulse
+            | Self::Upsampling
+            | Self::Shear
+            | Self::Distortion
+            | Self::DistortionRbf
+            | Self::DistortionRbfInv => true,
+        }
+    }
 }
 
 impl fmt::Display for CorruptionKind {

@@ -9,11 +9,18 @@
 mod corruption;
 pub mod corruptions;
 mod kind;
+mod normalize;
+mod pair;
 pub mod parameters;
 mod severity;
 mod variants;
 
 pub use corruption::{CorruptError, Corrupted, Corruption, corruption};
 pub use kind::{CorruptionKind, UnknownCorruption};
+pub use normalize::{BoxFrame, box_normalize};
+pub use pair::{
+    Bases, Corrupt, InvalidConfig, Label, Normalize, Pair, PairConfig, PairError, PairSynthesizer, PoseDraw,
+    Purpose, RotationRange, Sampling, Stream, dcp_test_pose, oracle_pose,
+};
 pub use severity::{Severity, SeverityOutOfRange};
 pub use variants::{DensityInc, InvalidVariant, Variants};
