@@ -1,6 +1,8 @@
 //! The floors that perfect correspondences leave under the deformations, against those measured
 //! with another implementation on ModelNet40 test shapes.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr, reason = "helpers of tests")]
+
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use srrf_cloud::source::{ShapeSource, SourceError, Split, default_data_path, open};
 use srrf_cloud::{EulerXyz, PointCloud};

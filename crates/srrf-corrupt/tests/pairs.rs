@@ -1,5 +1,7 @@
 //! Pair synthesis through the public door.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr, reason = "helpers of tests")]
+
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use srrf_cloud::{PointCloud, Rigid};
