@@ -106,8 +106,8 @@ impl PairBatch {
     /// # Shapes
     /// - `rotation`: `[batch, 3, 3]`, `translation`: `[batch, 3]`
     pub fn poses(&self, rotation: &Tensor<3>, translation: &Tensor<2>) -> Vec<Option<Rigid>> {
-        let rotations = rotation.to_data_as::<f64>().to_vec::<f64>().unwrap_or_default();
-        let translations = translation.to_data_as::<f64>().to_vec::<f64>().unwrap_or_default();
+        let rotations = rotation.try_to_vec_as::<f64>().unwrap_or_default();
+        let translations = translation.try_to_vec_as::<f64>().unwrap_or_default();
         self.frames
             .iter()
             .zip(rotations.chunks_exact(9).zip(translations.chunks_exact(3)))

@@ -18,7 +18,7 @@ impl HostClouds {
     /// Copies `clouds`, shape `[batch, points, 3]`.
     pub fn read(clouds: &Tensor<3>) -> Self {
         let [_, per_cloud, _] = clouds.dims();
-        let flat: Vec<f32> = clouds.to_data_as::<f32>().to_vec::<f32>().unwrap_or_default();
+        let flat: Vec<f32> = clouds.try_to_vec_as::<f32>().unwrap_or_default();
         let points = flat.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
         Self { points, per_cloud }
     }

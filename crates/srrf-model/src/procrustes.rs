@@ -30,7 +30,7 @@ const MIN_GAP: f64 = 1e-3;
 pub fn nearest_rotation(matrices: Tensor<3>) -> Tensor<3> {
     let [batch, _, _] = matrices.dims();
     let device = matrices.device().without_autodiff();
-    let values: Vec<f64> = matrices.to_data_as::<f64>().to_vec::<f64>().unwrap_or_default();
+    let values: Vec<f64> = matrices.try_to_vec_as::<f64>().unwrap_or_default();
 
     let mut parts: [Vec<f64>; 5] = Default::default(); // R0, A D, D A^T, B, K
     for m in values.chunks_exact(9) {
@@ -58,7 +58,7 @@ struct Solved {
 impl Solved {
     fn new(m: &Matrix3<f64>) -> Self {
         let solved = m.iter().all(|v| v.is_finite()).then(|| SVD::new(*m, true, true));
-        let Some((SVD { u: Some(a), v_t: Some(b_t), singular_values: s })) = solved else {
+        let Some(SVD { u: Some(a), v_t: Some(b_t), singular_values: s }) = solved else {
             let (one, bad) = (Matrix3::identity(), Matrix3::repeat(f64::NAN));
             return Self { parts: [one, bad, bad, one, one] };
         };

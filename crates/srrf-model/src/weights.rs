@@ -96,7 +96,7 @@ impl ModuleVisitor for Collector {
 
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
         let tensor = param.val();
-        let values = tensor.to_data_as::<f32>().to_vec::<f32>().unwrap_or_default();
+        let values = tensor.try_to_vec_as::<f32>().unwrap_or_default();
         self.found.insert(self.path.join("."), (tensor.dims().to_vec(), values));
     }
 }

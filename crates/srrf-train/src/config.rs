@@ -113,7 +113,7 @@ pub struct DrawConfig {
     /// Share of pairs with a small pose only (`residual_deg`, `residual_translation`), so that the
     /// network can be applied to its own result.
     pub residual: f64,
-    /// Largest Euler angle of such a pair, in degrees.
+    /// Largest angle of such a pair, about a random axis, in degrees.
     pub residual_deg: f64,
     /// Largest translation of such a pair along each axis.
     pub residual_translation: f64,
@@ -121,9 +121,12 @@ pub struct DrawConfig {
     pub independent: f64,
     /// Points a cloud in such a shard (ModelNet40's 1,024 points make two halves of 512).
     pub independent_points: usize,
-    /// Share of pairs whose shape is turned at random before anything else, so that the network
-    /// does not count on upright objects.
+    /// Share of pairs whose shape is turned at random before anything else, and whose pose is a
+    /// turn about a random axis by up to `turned_deg`, so that the network counts neither on
+    /// upright objects nor on DCP's positive angles.
     pub turned: f64,
+    /// Largest angle of such a pose, in degrees.
+    pub turned_deg: f64,
 }
 
 /// Weights of the losses.

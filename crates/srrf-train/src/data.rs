@@ -1,10 +1,15 @@
 //! Training pairs: which shape, which corruption, which pose, all from (seed, number of the pair).
 
+use nalgebra::{Rotation3, Unit, Vector3};
 use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
-use srrf_cloud::{PointCloud, Rigid, ShapeSource};
-use srrf_corrupt::{CorruptionKind, Pair, PairConfig, PairError, PairSynthesizer, Rotation, Sampling, Severity};
+use rand_distr::StandardNormal;
+use srrf_cloud::source::{ShapeSource, SourceError};
+use srrf_cloud::{PointCloud, Rigid};
+use srrf_corrupt::{
+    CorruptionKind, Pair, PairConfig, PairError, PairSynthesizer, PoseDraw, Sampling, Severity, Stream as PairStream,
+};
 
 use crate::config::{DrawConfig, TrainConfig};
 
@@ -47,7 +52,7 @@ impl PairSource {
         let training = (0..count).filter(|i| validation.binary_search(i).is_err()).collect();
         let drawn = &config.draw.corruptions;
         let kinds = if drawn.is_empty() { CorruptionKind::ALL.to_vec() } else { drawn.clone() };
-        let pairs = PairConfig { keep_correspondence: false, ..config.pairs.clone() };
+        let pairs = PairConfig { keep_correspondence: false, ..config.pairs };
         Self { shapes, training, validation, draw: config.draw.clone(), kinds, seed: config.seed, pairs }
     }
 
@@ -93,14 +98,10 @@ impl PairSource {
 
     fn training_pair(&self, shape: usize, number: usize, independent: bool) -> Result<Pair, PairError> {
         let mut rng = generator(self.seed, Stream::Training, number as u64);
-        let mut pairs = self.pairs.clone();
+        let mut pairs = self.pairs;
         if independent {
             pairs.sampling = Sampling::Independent;
             pairs.points = self.draw.independent_points;
-        }
-        if rng.random_bool(self.draw.residual) {
-            pairs.rotation = Rotation::EulerAxes { max_deg: self.draw.residual_deg };
-            pairs.translation = self.draw.residual_translation;
         }
         let corruption = if rng.random_bool(self.draw.clean) {
             None
@@ -109,13 +110,20 @@ impl PairSource {
             let severity = self.draw.severities[rng.random_range(0..self.draw.severities.len())];
             Severity::try_from(severity).ok().map(|severity| (kind, severity))
         };
-        let turned = rng.random_bool(self.draw.turned);
-        let seed = rng.random::<u64>();
+        let draw = &self.draw;
+        let (residual, turned) = (rng.random_bool(draw.residual), rng.random_bool(draw.turned));
+        let pose = match (residual, turned) {
+            (true, _) => PoseDraw::Given(random_pose(&mut rng, draw.residual_deg, draw.residual_translation)),
+            (_, true) => PoseDraw::Given(random_pose(&mut rng, draw.turned_deg, pairs.translation)),
+            _ => PoseDraw::Seeded,
+        };
+        let stream = PairStream { seed: rng.random(), item: number as u64 };
+        let synthesizer = PairSynthesizer::new(pairs)?;
         if turned {
-            let shapes = Turned { shapes: self.shapes.as_ref(), rotation: random_rotation(&mut rng) };
-            PairSynthesizer::new(pairs)?.pair(&shapes, shape, corruption, seed, number as u64)
+            let shapes = Turned { shapes: self.shapes.as_ref(), rotation: random_pose(&mut rng, 180.0, 0.0) };
+            synthesizer.pair(&shapes, shape, corruption, pose, stream)
         } else {
-            PairSynthesizer::new(pairs)?.pair(self.shapes.as_ref(), shape, corruption, seed, number as u64)
+            synthesizer.pair(self.shapes.as_ref(), shape, corruption, pose, stream)
         }
     }
 
@@ -124,27 +132,29 @@ impl PairSource {
     /// # Errors
     /// [`PairError`] when a shape cannot be read or corrupted.
     pub fn validation(&self, severity: Severity) -> Result<Vec<Pair>, PairError> {
-        let synthesizer = PairSynthesizer::new(self.pairs.clone())?;
-        let mut rng = generator(self.seed, Stream::Validation, 0);
-        let seed = rng.random::<u64>();
+        let synthesizer = PairSynthesizer::new(self.pairs)?;
+        let seed = generator(self.seed, Stream::Validation, 0).random::<u64>();
         self.validation
             .iter()
             .enumerate()
             .map(|(i, &shape)| {
                 let kind = self.kinds.get(i % (self.kinds.len() + 1)).copied();
                 let corruption = kind.map(|kind| (kind, severity));
-                synthesizer.pair(self.shapes.as_ref(), shape, corruption, seed, i as u64)
+                let stream = PairStream { seed, item: i as u64 };
+                synthesizer.pair(self.shapes.as_ref(), shape, corruption, PoseDraw::Seeded, stream)
             })
             .collect()
     }
 }
 
-/// Uniform on SO(3): the rotation nearest to a matrix of normal draws.
-fn random_rotation(rng: &mut ChaCha8Rng) -> Rigid {
-    let normal = rand_distr::StandardNormal;
-    let matrix = nalgebra::Matrix3::from_fn(|_, _| rng.sample::<f64, _>(normal));
-    let rotation = Rigid::nearest_rotation(&matrix).unwrap_or_else(nalgebra::Matrix3::identity);
-    Rigid { rotation, ..Rigid::identity() }
+/// A turn about a random axis by up to `max_deg`, and a translation of up to `translation` along
+/// each axis.
+fn random_pose(rng: &mut ChaCha8Rng, max_deg: f64, translation: f64) -> Rigid {
+    let axis = Vector3::from_fn(|_, _| rng.sample::<f64, _>(StandardNormal));
+    let angle_rad = (rng.random::<f64>() * max_deg).to_radians();
+    let rotation = Rotation3::from_axis_angle(&Unit::new_normalize(axis), angle_rad).into_inner();
+    let translation = Vector3::from_fn(|_, _| (2.0 * rng.random::<f64>() - 1.0) * translation);
+    Rigid { rotation, translation }
 }
 
 /// A source whose shapes are turned.
@@ -175,7 +185,7 @@ impl ShapeSource for Turned<'_> {
         index: usize,
         count: usize,
         rng: &mut ChaCha8Rng,
-    ) -> Result<PointCloud, srrf_cloud::SourceError> {
+    ) -> Result<PointCloud, SourceError> {
         Ok(self.shapes.sample(index, count, rng)?.transformed(&self.rotation))
     }
 
@@ -184,7 +194,7 @@ impl ShapeSource for Turned<'_> {
         index: usize,
         count: usize,
         rng: &mut ChaCha8Rng,
-    ) -> Result<(PointCloud, PointCloud), srrf_cloud::SourceError> {
+    ) -> Result<(PointCloud, PointCloud), SourceError> {
         let (a, b) = self.shapes.sample_two(index, count, rng)?;
         Ok((a.transformed(&self.rotation), b.transformed(&self.rotation)))
     }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use burn::tensor::Device;
 use clap::Parser;
-use srrf_cloud::{ProceduralShapes, ShapeSource, SourceError, Split};
+use srrf_cloud::source::{ACCEPTED_LAYOUTS, ShapeSource, Split, open};
 use srrf_train::config::{DataSource, TrainConfig};
 use srrf_train::resources::keep_freed_memory;
 use srrf_train::run::{Existing, RunError, RunOptions, run};
@@ -72,7 +72,7 @@ fn train(arguments: Arguments) -> Result<ExitCode, Failure> {
     let usage = |e: &dyn std::fmt::Display| Failure(2, e.to_string());
     let config = TrainConfig::read(&arguments.config).map_err(|e| usage(&e))?;
     let device = srrf_model::device(&arguments.device).map_err(|e| usage(&e))?;
-    let shapes = shapes(&config, arguments.data.as_deref()).map_err(|e| usage(&e))?;
+    let shapes = shapes(&config, arguments.data.as_deref()).map_err(|e| Failure(2, e))?;
     let options = RunOptions {
         folder: arguments.run.unwrap_or_else(|| Path::new("runs").join(&config.name)),
         threads: arguments.threads.unwrap_or_else(cores),
@@ -112,10 +112,14 @@ fn cores() -> usize {
 }
 
 /// The shapes that the configuration asks for.
-fn shapes(config: &TrainConfig, data: Option<&Path>) -> Result<Box<dyn ShapeSource>, SourceError> {
+fn shapes(config: &TrainConfig, data: Option<&Path>) -> Result<Box<dyn ShapeSource>, String> {
+    const WITHOUT: &str = "to train without a download: srrf-train --config configs/shapes.toml";
     match (config.data.source, data.or(config.data.path.as_deref())) {
-        (DataSource::Shapes, _) => Ok(Box::new(ProceduralShapes::new(config.seed, config.data.shapes, None))),
-        (DataSource::Modelnet, Some(path)) => srrf_cloud::open(path, Split::Train),
-        (DataSource::Modelnet, None) => Err(SourceError::NotGiven),
+        (DataSource::Shapes, _) => Err("built-in shapes: not yet".into()),
+        (DataSource::Modelnet, Some(path)) => open(path, Split::Train).map_err(|e| format!("{e}\n{WITHOUT}")),
+        (DataSource::Modelnet, None) => Err(format!(
+            "this configuration trains on ModelNet40; say where it is by --data PATH, $SRRF_DATA or `data.path`. \
+             {ACCEPTED_LAYOUTS}\n{WITHOUT}"
+        )),
     }
 }

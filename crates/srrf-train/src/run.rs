@@ -9,7 +9,7 @@ use burn::module::Module;
 use burn::optim::decay::WeightDecayConfig;
 use burn::optim::{AdamConfig, AdamWConfig, ModuleOptimizer};
 use burn::tensor::Device;
-use srrf_cloud::ShapeSource;
+use srrf_cloud::source::ShapeSource;
 use srrf_corrupt::{Pair, Severity};
 use srrf_model::weights::{to_safetensors, write_atomically};
 use srrf_model::{Srrf, init};
@@ -260,7 +260,8 @@ impl<'a> Run<'a> {
         if clip > 0.0 && outcome.norm > clip {
             scale(&self.model, &mut outcome.gradients, clip / outcome.norm);
         }
-        self.model = self.optimizer.step(rate, self.model.clone(), outcome.gradients);
+        // The optimiser takes a module on the autodiff device; between steps it lives without.
+        self.model = self.optimizer.step(rate, self.model.clone().train(), outcome.gradients).valid();
         outcome.losses.insert("gradient_norm", outcome.norm);
         Ok(outcome.losses)
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use srrf_cloud::Rigid;
 use srrf_corrupt::Pair;
-use srrf_eval::metrics::{MetricError, PairError, Scores};
+use srrf_eval::{MetricError, PairError, Scores};
 use srrf_model::{IntegrationConfig, Srrf, chamfer, spread, transform};
 
 use crate::step::{Workers, to_batch};
