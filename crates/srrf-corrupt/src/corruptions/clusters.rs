@@ -11,14 +11,31 @@ pub(super) fn scaled(count: usize, points: usize) -> usize {
 
 /// Draws a centre uniformly from `pool` (indices into `points`) and moves its `size` nearest
 /// members, the centre included, out of the pool. Both lists keep their order; a smaller pool is
-/// emptied. Distances are Euclidean; equal ones are decided by the index.
+/// emptied.
 pub(super) fn take<R: Rng>(points: &[[f64; 3]], pool: &mut Vec<u32>, size: usize, rng: &mut R) -> Vec<u32> {
-    if pool.is_empty() || size == 0 {
+    if pool.is_empty() {
         return Vec::new();
     }
     let centre = points[pool[rng.random_range(0..pool.len())] as usize];
+    let (near, far) = split_nearest(points, pool, &centre, size);
+    *pool = far;
+    near
+}
+
+/// The `size` members of `pool` (indices into `points`, each within its bounds) that are nearest
+/// to `centre`, and the others; both in the order of the pool. Distances are Euclidean; equal
+/// ones are decided by the index.
+pub fn split_nearest(
+    points: &[[f64; 3]],
+    pool: &[u32],
+    centre: &[f64; 3],
+    size: usize,
+) -> (Vec<u32>, Vec<u32>) {
+    if size == 0 {
+        return (Vec::new(), pool.to_vec());
+    }
     if size >= pool.len() {
-        return std::mem::take(pool);
+        return (pool.to_vec(), Vec::new());
     }
     let key = |index: u32| -> (f64, u32) {
         let p = &points[index as usize];
@@ -27,9 +44,7 @@ pub(super) fn take<R: Rng>(points: &[[f64; 3]], pool: &mut Vec<u32>, size: usize
     let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
     let mut keys: Vec<(f64, u32)> = pool.iter().map(|&index| key(index)).collect();
     let farthest = *keys.select_nth_unstable_by(size - 1, order).1;
-    let (near, far) = pool.iter().partition(|&&index| order(&key(index), &farthest).is_le());
-    *pool = far;
-    near
+    pool.iter().partition(|&&index| order(&key(index), &farthest).is_le())
 }
 
 #[cfg(test)]

@@ -174,6 +174,20 @@ mod tests {
     }
 
     #[test]
+    fn directions_favour_the_z_axis() {
+        // By the density of g the mean of z^2 is 1/2 and those of x^2 and y^2 are 1/4; uniform on
+        // the sphere all would be 1/3. Over 25,000 directions the standard error is 0.0023 at most.
+        let mut rng = rng(1);
+        let mut squares = [0.0; 3];
+        for _ in 0..200 {
+            for d in draw_displacements(Severity::ALL[2], &mut rng) {
+                (0..3).for_each(|c| squares[c] += (d[c] / 0.075).powi(2) / 25_000.0);
+            }
+        }
+        assert!((0..3).all(|c| (squares[c] - [0.25, 0.25, 0.5][c]).abs() < 0.01), "{squares:?}");
+    }
+
+    #[test]
     fn strength() {
         // Measured on ModelNet40 shapes; spheres are near that.
         let points = cloud(256);

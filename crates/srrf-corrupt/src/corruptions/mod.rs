@@ -2,7 +2,7 @@
 //! is public, so that it can be compared with other implementations number by number.
 
 mod background;
-mod clusters;
+pub mod clusters;
 mod cutout;
 mod density_dec;
 mod density_inc;
