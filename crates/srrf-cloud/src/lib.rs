@@ -12,6 +12,7 @@ mod neighbours;
 mod normals;
 mod register;
 mod rigid;
+pub mod shapes;
 pub mod source;
 
 pub use cloud::{CloudError, PointCloud, UnitSphere};

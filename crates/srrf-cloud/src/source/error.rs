@@ -53,6 +53,17 @@ pub enum SourceError {
         /// What is wrong with it.
         source: CloudError,
     },
+    /// A family of procedural shapes that does not exist, or none at all.
+    #[error("there is no family of shapes named {name:?}; the families are {known}")]
+    Families {
+        /// The name that was given.
+        name: String,
+        /// The names that exist.
+        known: String,
+    },
+    /// A set of no shapes was asked for.
+    #[error("a set of 0 shapes was asked for; 1 is the least")]
+    NoShapes,
     /// There is no shape of that number.
     #[error("shape {index} was asked for, but there are only {len}")]
     NoSuchShape {
