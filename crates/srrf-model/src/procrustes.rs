@@ -11,13 +11,15 @@
 //!
 //! which is linear in `dM`. So `R0 + L(M - detach(M))` has the value `R0` and the derivative `L`
 //! on every backend. Sums `p_i + p_j` are kept above `1e-3 p_1`, which bounds the gradient where
-//! the rotation is not determined (lines, reflections).
+//! the rotation is not determined (lines, reflections); a matrix of zeros has gradient 0.
 
-use burn::tensor::{Tensor, TensorData};
+use burn::tensor::{Bool, Tensor, TensorData};
 use nalgebra::{Matrix3, SVD, Vector3};
 
 /// Smallest `p_i + p_j`, as a share of the largest singular value.
 const MIN_GAP: f64 = 1e-3;
+/// Largest singular value that counts as zero: the inverse of `MIN_GAP` times it still fits `f32`.
+const ZERO: f64 = 1e-30;
 
 /// The rotation nearest to each matrix: argmax of `tr(R^T M)` over SO(3), differentiable.
 ///
@@ -33,8 +35,10 @@ pub fn nearest_rotation(matrices: Tensor<3>) -> Tensor<3> {
     let values: Vec<f64> = matrices.try_to_vec_as::<f64>().unwrap_or_default();
 
     let mut parts: [Vec<f64>; 5] = Default::default(); // R0, A D, D A^T, B, K
+    let mut unsolved = Vec::with_capacity(batch * 9);
     for m in values.chunks_exact(9) {
         let solved = Solved::new(&Matrix3::from_row_slice(m));
+        unsolved.extend([solved.parts[1][(0, 0)].is_nan(); 9]);
         for (part, matrix) in parts.iter_mut().zip(solved.parts) {
             part.extend(matrix.transpose().iter()); // row-major
         }
@@ -46,7 +50,14 @@ pub fn nearest_rotation(matrices: Tensor<3>) -> Tensor<3> {
     let change = matrices.clone() - matrices.detach(); // zero, with the derivative of M
     let n = dat.matmul(change).matmul(b.clone());
     let turn = k * (n.clone() - n.transpose());
-    r0 + ad.matmul(turn).matmul(b.transpose())
+    let rotation = r0.clone() + ad.matmul(turn).matmul(b.transpose());
+    if !unsolved.contains(&true) {
+        return rotation;
+    }
+    // The change of an unsolved matrix is NaN, not 0. Its factors turn any gradient into NaN, also
+    // the 0 that comes back through the mask.
+    let unsolved = Tensor::<3, Bool>::from_data(TensorData::new(unsolved, [batch, 3, 3]), &device);
+    rotation.mask_where(unsolved, r0)
 }
 
 /// The constants of one 3 x 3 problem.
@@ -65,8 +76,10 @@ impl Solved {
         // nalgebra sorts singular values in descending order, so the last one takes the sign.
         let d = Vector3::new(1.0, 1.0, (a * b_t).determinant().signum());
         let p = s.component_mul(&d);
-        let floor = (MIN_GAP * p[0]).max(f64::MIN_POSITIVE.sqrt());
-        let k = Matrix3::from_fn(|i, j| 1.0 / (p[i] + p[j]).max(floor));
+        let k = match p[0] > ZERO {
+            true => Matrix3::from_fn(|i, j| 1.0 / (p[i] + p[j]).max(MIN_GAP * p[0])),
+            false => Matrix3::zeros(),
+        };
         let ad = a * Matrix3::from_diagonal(&d);
         Self { parts: [ad * b_t, ad, ad.transpose(), b_t.transpose(), k] }
     }
