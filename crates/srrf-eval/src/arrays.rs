@@ -129,15 +129,24 @@ pub fn read_npy(path: &Path) -> Result<Array, ArrayError> {
     })
 }
 
-/// Reads all arrays of a `.npz` file, by name.
+/// The arrays of a `.npz` file.
+#[derive(Debug, Clone, Default)]
+pub struct Npz {
+    /// Names in the order of the file.
+    pub names: Vec<String>,
+    /// The arrays by name.
+    pub arrays: BTreeMap<String, Array>,
+}
+
+/// Reads all arrays of a `.npz` file.
 ///
 /// # Errors
 /// [`ArrayError`] with the file, the array and what is wrong with it.
-pub fn read_npz(path: &Path) -> Result<BTreeMap<String, Array>, ArrayError> {
+pub fn read_npz(path: &Path) -> Result<Npz, ArrayError> {
     let file = File::open(path).map_err(|source| ArrayError::Io { path: path.to_owned(), source })?;
     let archive = |source| ArrayError::Archive { path: path.to_owned(), source };
     let mut zip = zip::ZipArchive::new(BufReader::new(file)).map_err(archive)?;
-    let mut arrays = BTreeMap::new();
+    let mut npz = Npz::default();
     for index in 0..zip.len() {
         let entry = zip.by_index(index).map_err(archive)?;
         let Some(name) = entry.name().map_err(archive)?.strip_suffix(".npy").map(str::to_owned) else {
@@ -149,9 +158,10 @@ pub fn read_npz(path: &Path) -> Result<BTreeMap<String, Array>, ArrayError> {
             array: name.clone(),
             problem,
         })?;
-        arrays.insert(name, array);
+        npz.names.push(name.clone());
+        npz.arrays.insert(name, array);
     }
-    Ok(arrays)
+    Ok(npz)
 }
 
 /// The bytes of a `.npy` file.
@@ -261,9 +271,9 @@ mod tests {
         assert_eq!(write(), write());
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), write()).unwrap();
-        let arrays = read_npz(file.path()).unwrap();
-        assert_eq!(arrays.keys().collect::<Vec<_>>(), ["a_t", "a_x"]);
-        assert_eq!(arrays["a_x"].shape, [1, 2, 3]);
+        let npz = read_npz(file.path()).unwrap();
+        assert_eq!(npz.names, ["a_x", "a_t"]);
+        assert_eq!(npz.arrays["a_x"].shape, [1, 2, 3]);
         std::fs::write(file.path(), "text").unwrap();
         assert!(read_npz(file.path()).unwrap_err().to_string().contains("not an .npz archive"));
     }

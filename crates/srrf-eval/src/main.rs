@@ -1,2 +1,124 @@
-//! main
-fn main() {}
+//! `srrf-eval`: scores registration methods on clean and corrupted pairs.
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+use srrf_eval::{
+    EvalError, Meta, MethodContext, Options, PairFile, PairSource, Run, Summary, SynthesizedPairs,
+    Transforms, data, report,
+};
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let _ = writeln!(io::stderr(), "error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<(), EvalError> {
+    let (start, threads) = (Instant::now(), options.thread_count()?);
+    let mut selection = srrf_eval::select(&options.methods)?;
+    report::prepare(&options.out)?;
+    let pairs = open_pairs(options)?;
+    say(&format!("data: {}", pairs.description()));
+    if options.pairs.is_none() {
+        say(&format!("seed: {}", options.seed));
+    }
+
+    let transforms = options
+        .transforms
+        .iter()
+        .map(|path| Transforms::read(path, pairs.groups()))
+        .collect::<Result<Vec<_>, _>>()?;
+    selection.add_transforms(&transforms)?;
+    if !pairs.has_oracle() {
+        selection.drop_oracle(&options.methods)?;
+    }
+    let context = MethodContext { weights: options.weights.clone(), device: options.device.clone() };
+    let methods = selection.set_up(&context)?;
+    let weights = methods
+        .iter()
+        .filter_map(|(_, m)| Some((m.register.name().to_owned(), m.weights.clone()?)))
+        .inspect(|(name, weights)| say(&format!("weights of {name}: {weights}")))
+        .collect();
+    if let Some(path) = &options.export_pairs {
+        let bar = progress(pairs.as_ref(), "exporting");
+        srrf_eval::export(pairs.as_ref(), path, &mut || bar.inc(1))?;
+        bar.finish_and_clear();
+        say(&format!("pairs written to {}", path.display()));
+    }
+
+    let bar = progress(pairs.as_ref(), "starting");
+    let run = Run {
+        pairs: pairs.as_ref(),
+        methods,
+        transforms,
+        rows: selection.rows,
+        batch: options.batch.max(1),
+        threads,
+    };
+    let outcome = run.execute(&mut |done, group| {
+        bar.inc(done as u64);
+        bar.set_message(group.to_owned());
+    })?;
+    bar.finish_and_clear();
+
+    let summary = Summary::of(&outcome)?;
+    let meta = Meta {
+        version: env!("CARGO_PKG_VERSION").into(),
+        command: std::env::args().collect::<Vec<_>>().join(" "),
+        data: pairs.description(),
+        seed: options.seed,
+        weights,
+        device: options.device.clone(),
+        threads,
+        batch: run.batch,
+        machine: report::machine(),
+        seconds: start.elapsed().as_secs_f64(),
+        started_unix: SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .map_or(0, |d| d.as_secs().saturating_sub(start.elapsed().as_secs())),
+    };
+    let written = report::write(&options.out, &meta, &summary, &outcome)?;
+    say("");
+    say(&report::screen(&summary));
+    let names: Vec<String> =
+        written.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
+    say(&format!(
+        "{} pairs in {:.1} s; written to {}: {}",
+        outcome.records.len(),
+        meta.seconds,
+        options.out.display(),
+        names.join(", ")
+    ));
+    Ok(())
+}
+
+/// The pairs of a file, or pairs made from shapes.
+fn open_pairs(options: &Options) -> Result<Box<dyn PairSource>, EvalError> {
+    if let Some(path) = &options.pairs {
+        return Ok(Box::new(PairFile::read(path)?));
+    }
+    let protocol = options.protocol()?;
+    let shapes = data::open(options.data.as_deref(), protocol.shapes)?;
+    Ok(Box::new(SynthesizedPairs::new(shapes, protocol)?))
+}
+
+/// A bar on the terminal, if there is one.
+fn progress(pairs: &dyn PairSource, message: &'static str) -> ProgressBar {
+    let total = pairs.groups().iter().map(|g| g.pairs as u64).sum();
+    let template = "{msg:24} {wide_bar} {pos}/{len} pairs, {eta} left";
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(total).with_style(style).with_message(message)
+}
+
+/// A line on standard output; a closed pipe is no reason to stop before the report is written.
+fn say(line: &str) {
+    let _ = writeln!(io::stdout(), "{line}");
+}

@@ -6,6 +6,7 @@ use srrf_baselines::{Icp, IcpConfig, Identity};
 use srrf_cloud::Register;
 
 use crate::EvalError;
+use crate::transforms::Transforms;
 
 /// Name of the row that fits a pose to the true correspondences: the floor for any estimator that
 /// does least squares on matches.
@@ -95,6 +96,61 @@ pub fn select(names: &[String]) -> Result<Selection, EvalError> {
         known.iter().filter(|row| wanted(row, by_default(row))).map(|row| (*row).to_owned()).collect();
     let entries = METHODS.iter().filter(|m| m.rows.iter().any(|r| rows.iter().any(|row| row == r))).collect();
     Ok(Selection { entries, rows })
+}
+
+impl Selection {
+    /// Adds a row for each file of transforms.
+    ///
+    /// # Errors
+    /// [`EvalError::Usage`] where the name of a file is that of a row already.
+    pub fn add_transforms(&mut self, transforms: &[Transforms]) -> Result<(), EvalError> {
+        for file in transforms {
+            if all_rows().contains(&file.name.as_str()) || self.rows.contains(&file.name) {
+                return Err(EvalError::Usage(format!(
+                    "--transforms: the row `{}` exists already; the row is named after the file, so rename the \
+                     file",
+                    file.name
+                )));
+            }
+            self.rows.push(file.name.clone());
+        }
+        Ok(())
+    }
+
+    /// Leaves out the oracle, for pairs without correspondences.
+    ///
+    /// # Errors
+    /// [`EvalError::Usage`] where `names` (`--methods`) asks for it.
+    pub fn drop_oracle(&mut self, names: &[String]) -> Result<(), EvalError> {
+        if names.iter().any(|n| n == ORACLE) {
+            return Err(EvalError::Usage(
+                "--methods oracle: these pairs keep no correspondences; use --sampling shared, or pairs \
+                 exported by this program"
+                    .into(),
+            ));
+        }
+        self.rows.retain(|row| row != ORACLE);
+        Ok(())
+    }
+
+    /// Sets up the methods, each with the rows that it fills.
+    ///
+    /// # Errors
+    /// [`EvalError::Setup`] where one cannot be set up, and where no row is left.
+    pub fn set_up(
+        &self,
+        context: &MethodContext,
+    ) -> Result<Vec<(&'static [&'static str], Method)>, EvalError> {
+        if self.rows.is_empty() {
+            return Err(EvalError::Usage("no method is left to score".into()));
+        }
+        let set_up = |entry: &&'static MethodEntry| {
+            (entry.build)(context)
+                .map(|method| (entry.rows, method))
+                .map_err(|problem| EvalError::Setup { name: entry.name.to_owned(), problem })
+        };
+        self.entries.iter().map(set_up).collect()
+    }
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@
 //! | `<group>_t` | `[n, 3]` | true translations: `target = R source + t` |
 //! | `<group>_clean` | `[n, K, 3]` | optional: the clean shape in the source frame |
 //! | `<group>_symmetric` | `[n]` | optional: whether the shape is symmetric about an axis |
+//! | `<group>_x_origin`, `<group>_y_origin` | `[n, N]`, `[n, M]` | optional: number of the clean point that each point is, -1 for none; points of equal number correspond |
 //!
 //! as `float32` or `float64`, in C or Fortran order. Exported files hold `float64`.
 
@@ -19,8 +20,9 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Vector3};
 use srrf_cloud::{PointCloud, Rigid};
+use srrf_corrupt::Pair;
 
-use crate::arrays::{self, Array, ArrayError, NpzWriter};
+use crate::arrays::{self, Array, ArrayError, Npz, NpzWriter};
 use crate::pairs::{EvalPair, Group, PairSource};
 use crate::{EvalError, output};
 
@@ -43,6 +45,8 @@ struct GroupArrays {
     poses: Vec<Rigid>,
     clean: Option<Array>,
     symmetric: Option<Array>,
+    x_origin: Option<Array>,
+    y_origin: Option<Array>,
 }
 
 impl PairFile {
@@ -51,21 +55,18 @@ impl PairFile {
     /// # Errors
     /// [`ArrayError`] which names the file, the array, what is wrong and what is expected.
     pub fn read(path: &Path) -> Result<Self, ArrayError> {
-        let mut arrays = arrays::read_npz(path)?;
-        let mut names: Vec<String> = arrays
-            .keys()
-            .filter_map(|name| ["_x", "_y", "_R", "_t"].iter().find_map(|end| name.strip_suffix(end)))
-            .map(str::to_owned)
-            .collect();
-        names.sort();
-        names.dedup();
+        let Npz { names: have, mut arrays } = arrays::read_npz(path)?;
+        let mut names: Vec<&str> = Vec::new();
+        for array in &have {
+            let group = ["_x", "_y", "_R", "_t"].iter().find_map(|end| array.strip_suffix(end));
+            names.extend(group.filter(|group| !names.contains(group)));
+        }
         let bad = |array: &str, problem: String| ArrayError::Array {
             path: path.to_owned(),
             array: array.to_owned(),
             problem,
         };
         if names.is_empty() {
-            let have: Vec<&str> = arrays.keys().map(String::as_str).collect();
             let problem = format!(
                 "no group of pairs: expected arrays <group>_x, <group>_y, <group>_R and <group>_t, found {have:?}"
             );
@@ -74,8 +75,8 @@ impl PairFile {
         let (mut groups, mut contents) = (Vec::new(), Vec::new());
         for name in names {
             let content =
-                GroupArrays::take(&mut arrays, &name).map_err(|(array, problem)| bad(&array, problem))?;
-            groups.push(Group { corruption: name, severity: 0, pairs: content.poses.len() });
+                GroupArrays::take(&mut arrays, name).map_err(|(array, problem)| bad(&array, problem))?;
+            groups.push(Group { corruption: name.to_owned(), severity: 0, pairs: content.poses.len() });
             contents.push(content);
         }
         Ok(Self { path: path.to_owned(), groups, contents })
@@ -99,8 +100,10 @@ impl GroupArrays {
         };
         let clean = optional("clean", &[Some(n), None, Some(3)])?;
         let symmetric = optional("symmetric", &[Some(n)])?;
+        let x_origin = optional("x_origin", &[Some(n), Some(x.shape[1])])?;
+        let y_origin = optional("y_origin", &[Some(n), Some(y.shape[1])])?;
         let poses = poses(&rotations, &translations).map_err(|problem| (format!("{group}_R"), problem))?;
-        Ok(Self { x, y, poses, clean, symmetric })
+        Ok(Self { x, y, poses, clean, symmetric, x_origin, y_origin })
     }
 }
 
@@ -177,7 +180,7 @@ impl PairSource for PairFile {
     }
 
     fn has_oracle(&self) -> bool {
-        false
+        self.contents.iter().all(|c| c.x_origin.is_some() && c.y_origin.is_some())
     }
 
     fn pair(&self, group: usize, item: usize) -> Result<EvalPair, EvalError> {
@@ -192,16 +195,18 @@ impl PairSource for PairFile {
                 })
             })
         };
-        Ok(EvalPair {
-            id: format!("{name}_{item}"),
-            class: String::new(),
-            symmetric: arrays.symmetric.as_ref().is_some_and(|a| a.values[item] != 0.0),
+        let pair = Pair {
             source: cloud(&arrays.x, "x")?,
             target: cloud(&arrays.y, "y")?,
             target_from_source: arrays.poses[item],
-            clean: arrays.clean.as_ref().map(|a| row(a, item)),
-            oracle: None,
-        })
+            source_origin: arrays.x_origin.as_ref().map(|a| origins(a, item)),
+            target_origin: arrays.y_origin.as_ref().map(|a| origins(a, item)),
+            corruption: None,
+            id: format!("{name}_{item}"),
+            class: String::new(),
+            symmetric: arrays.symmetric.as_ref().is_some_and(|a| a.values[item] != 0.0),
+        };
+        Ok(EvalPair { pair, clean: arrays.clean.as_ref().map(|a| row(a, item)) })
     }
 }
 
@@ -210,6 +215,13 @@ fn row(array: &Array, item: usize) -> Vec<[f64; 3]> {
     let length = array.shape[1];
     let (points, _) = array.values.as_chunks::<3>();
     points[item * length..(item + 1) * length].to_vec()
+}
+
+/// Row `item` of an array of origins; negative numbers stand for none.
+fn origins(array: &Array, item: usize) -> Vec<Option<u32>> {
+    let length = array.shape[1];
+    let row = &array.values[item * length..(item + 1) * length];
+    row.iter().map(|&v| (v >= 0.0).then_some(v as u32)).collect()
 }
 
 /// Writes all pairs of `source` to `path`, first under a temporary name. `after_pair` is called
@@ -230,36 +242,60 @@ pub fn export(source: &dyn PairSource, path: &Path, after_pair: &mut dyn FnMut()
                 pair
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let (name, n) = (group.name(), pairs.len());
-        let mut points = |suffix: &str, of: &dyn Fn(&EvalPair) -> Option<&[[f64; 3]]>| {
-            let rows: Vec<&[[f64; 3]]> = pairs.iter().filter_map(of).collect();
-            let length = rows.first().map_or(0, |r| r.len());
-            if rows.len() < n || rows.iter().any(|r| r.len() != length) {
-                return if suffix == "clean" {
-                    Ok(()) // optional, and of no use where it is not the same for all
-                } else {
-                    Err(EvalError::Ragged { group: name.clone(), array: format!("{name}_{suffix}") })
-                };
-            }
-            let values: Vec<f64> = rows.iter().flat_map(|r| r.as_flattened()).copied().collect();
-            npz.array(&format!("{name}_{suffix}"), &[n, length, 3], &values).map_err(io)
-        };
-        points("x", &|p| Some(p.source.points()))?;
-        points("y", &|p| Some(p.target.points()))?;
-        points("clean", &|p| p.clean.as_deref())?;
-        let rotations: Vec<f64> = pairs
-            .iter()
-            .flat_map(|p| p.target_from_source.rotation.transpose().iter().copied().collect::<Vec<_>>())
-            .collect();
-        let translations: Vec<f64> = pairs
-            .iter()
-            .flat_map(|p| p.target_from_source.translation.iter().copied().collect::<Vec<_>>())
-            .collect();
-        let symmetric: Vec<f64> = pairs.iter().map(|p| f64::from(p.symmetric)).collect();
-        npz.array(&format!("{name}_R"), &[n, 3, 3], &rotations).map_err(io)?;
-        npz.array(&format!("{name}_t"), &[n, 3], &translations).map_err(io)?;
-        npz.array(&format!("{name}_symmetric"), &[n], &symmetric).map_err(io)?;
+        write_group(&mut npz, &group.name(), &pairs, &io)?;
     }
     let file = npz.finish().map_err(io)?.into_inner().map_err(|e| io(e.into_error()))?;
     output::persist(file, path).map_err(io)
 }
+
+/// Writes the arrays of one group.
+fn write_group<W: io::Write + io::Seek>(
+    npz: &mut NpzWriter<W>,
+    name: &str,
+    pairs: &[EvalPair],
+    io: &dyn Fn(io::Error) -> EvalError,
+) -> Result<(), EvalError> {
+    let n = pairs.len();
+    let mut array = |suffix: &str, shape: &[usize], values: Vec<f64>| {
+        npz.array(&format!("{name}_{suffix}"), shape, &values).map_err(io)
+    };
+    let points = |suffix: &str, clouds: Vec<&[[f64; 3]]>| {
+        let length = clouds[0].len();
+        if clouds.iter().any(|c| c.len() != length) {
+            return Err(EvalError::Ragged { group: name.to_owned(), array: format!("{name}_{suffix}") });
+        }
+        Ok((length, clouds.iter().flat_map(|c| c.as_flattened()).copied().collect::<Vec<f64>>()))
+    };
+    let (sources, x) = points("x", pairs.iter().map(|p| p.pair.source.points()).collect())?;
+    let (targets, y) = points("y", pairs.iter().map(|p| p.pair.target.points()).collect())?;
+    array("x", &[n, sources, 3], x)?;
+    array("y", &[n, targets, 3], y)?;
+    let poses = || pairs.iter().map(|p| p.pair.target_from_source);
+    // nalgebra stores columns: the transpose gives rows.
+    array(
+        "R",
+        &[n, 3, 3],
+        poses().flat_map(|p| <[[f64; 3]; 3]>::from(p.rotation.transpose())).flatten().collect(),
+    )?;
+    array("t", &[n, 3], poses().flat_map(|p| <[f64; 3]>::from(p.translation)).collect())?;
+    array("symmetric", &[n], pairs.iter().map(|p| f64::from(p.pair.symmetric)).collect())?;
+
+    let clean: Vec<&[[f64; 3]]> = pairs.iter().filter_map(|p| p.clean.as_deref()).collect();
+    if clean.len() == n {
+        let (length, values) = points("clean", clean)?;
+        array("clean", &[n, length, 3], values)?;
+    }
+    let origins = |of: fn(&Pair) -> &Option<Vec<Option<u32>>>| -> Vec<f64> {
+        let rows = pairs.iter().filter_map(|p| of(&p.pair).as_deref());
+        rows.flatten().map(|origin| origin.map_or(-1.0, f64::from)).collect()
+    };
+    let (x_origin, y_origin) = (origins(|p| &p.source_origin), origins(|p| &p.target_origin));
+    if x_origin.len() == n * sources && y_origin.len() == n * targets {
+        array("x_origin", &[n, sources], x_origin)?;
+        array("y_origin", &[n, targets], y_origin)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

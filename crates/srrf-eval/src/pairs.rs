@@ -1,28 +1,16 @@
 //! Pairs to be scored: what a pair is, and where pairs come from.
 
-use srrf_cloud::{PointCloud, Rigid};
+use srrf_corrupt::Pair;
 
 use crate::EvalError;
 
-/// Two clouds and the pose that maps one to the other.
+/// A pair to be scored.
 #[derive(Debug, Clone)]
 pub struct EvalPair {
-    /// Name of the shape, for the report.
-    pub id: String,
-    /// Its category; empty if unknown.
-    pub class: String,
-    /// Whether its class is symmetric about an axis, so that no pose is unique.
-    pub symmetric: bool,
-    /// The source cloud.
-    pub source: PointCloud,
-    /// The target cloud: `target ~ R source + t`.
-    pub target: PointCloud,
-    /// The true pose.
-    pub target_from_source: Rigid,
+    /// The clouds, the true pose, the shape's name and, where known, the correspondences.
+    pub pair: Pair,
     /// The clean shape in the source frame, shape `[k, 3]`, where it is known.
     pub clean: Option<Vec<[f64; 3]>>,
-    /// The least squares pose on the true correspondences, where those are known and determine one.
-    pub oracle: Option<Rigid>,
 }
 
 /// A set of pairs that are summed up together.
@@ -56,7 +44,7 @@ pub trait PairSource: Sync {
     /// The groups, in the order of the report; at least 1.
     fn groups(&self) -> &[Group];
 
-    /// Whether the pairs know their correspondences, so that the oracle can be scored.
+    /// Whether the pairs keep their correspondences, so that the oracle can be scored.
     fn has_oracle(&self) -> bool;
 
     /// Pair `item` of group `group`.

@@ -42,7 +42,7 @@ impl Transforms {
     pub fn read(path: &Path, groups: &[Group]) -> Result<Self, EvalError> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
         let per_group = match extension.as_str() {
-            "npz" => from_npz(&arrays::read_npz(path)?, groups),
+            "npz" => from_npz(&arrays::read_npz(path)?.arrays, groups),
             "npy" => matrices(&arrays::read_npy(path)?).and_then(|all| split(all, groups)),
             "json" => {
                 fs::read_to_string(path).map_err(|e| e.to_string()).and_then(|text| from_json(&text, groups))

@@ -1,0 +1,316 @@
+//! Runs methods over pairs and keeps every answer.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+use srrf_cloud::{Registration, Rigid};
+use srrf_corrupt::oracle_pose;
+
+use crate::EvalError;
+use crate::chamfer::CleanShape;
+use crate::methods::{Method, ORACLE};
+use crate::metrics::{PairError, is_finite};
+use crate::pairs::{EvalPair, Group, PairSource};
+use crate::transforms::Transforms;
+
+/// What is run, and how.
+pub struct Run<'a> {
+    /// The pairs.
+    pub pairs: &'a dyn PairSource,
+    /// The methods, set up, each with the names of the rows that it fills.
+    pub methods: Vec<(&'static [&'static str], Method)>,
+    /// Answers of other tools, a row each.
+    pub transforms: Vec<Transforms>,
+    /// Names of the rows to keep, in the order of the tables.
+    pub rows: Vec<String>,
+    /// Pairs in one call of a method.
+    pub batch: usize,
+    /// Worker threads, at least 1.
+    pub threads: usize,
+}
+
+/// A method's answer on one pair.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    /// Its errors.
+    pub error: PairError,
+    /// The pose; `None` where there is none.
+    pub pose: Option<Rigid>,
+    /// Why there is no pose.
+    pub failure: Option<String>,
+    /// Iterations that the method used.
+    pub iterations: Option<usize>,
+    /// Whether the method's own stopping rule was met.
+    pub converged: Option<bool>,
+    /// Time of the call, divided by the pairs in it; `None` for transforms from a file.
+    pub seconds: Option<f64>,
+}
+
+/// A pair with the answers of all rows.
+#[derive(Debug, Clone)]
+pub struct PairRecord {
+    /// Number of its group.
+    pub group: usize,
+    /// Its number in the group.
+    pub item: usize,
+    /// Name of the shape.
+    pub id: String,
+    /// Its category; empty if unknown.
+    pub class: String,
+    /// Whether its category is symmetric about an axis.
+    pub symmetric: bool,
+    /// The true pose.
+    pub truth: Rigid,
+    /// The answers, one for each of [`Outcome::rows`].
+    pub answers: Vec<Answer>,
+}
+
+/// All answers of a run.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The groups.
+    pub groups: Vec<Group>,
+    /// Names of the rows, in the order of the tables.
+    pub rows: Vec<String>,
+    /// The pairs, group after group.
+    pub records: Vec<PairRecord>,
+}
+
+impl Run<'_> {
+    /// Runs every method on every pair. `after_chunk` hears how many pairs have just been done, and
+    /// the name of the group of the last.
+    ///
+    /// Answers do not depend on `threads`.
+    ///
+    /// # Errors
+    /// [`EvalError`] where a pair cannot be made. A method that fails is no error: its failures are
+    /// counted.
+    pub fn execute(&self, after_chunk: &mut (dyn FnMut(usize, &str) + Send)) -> Result<Outcome, EvalError> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build()?;
+        pool.install(|| self.execute_here(after_chunk))
+    }
+
+    fn execute_here(&self, after_chunk: &mut (dyn FnMut(usize, &str) + Send)) -> Result<Outcome, EvalError> {
+        let groups = self.pairs.groups();
+        let work: Vec<(usize, usize)> = groups
+            .iter()
+            .enumerate()
+            .flat_map(|(group, g)| (0..g.pairs).map(move |item| (group, item)))
+            .collect();
+        let mut records = Vec::with_capacity(work.len());
+        for chunk in work.chunks(self.batch.max(1) * self.threads.max(1)) {
+            let pairs: Vec<EvalPair> = chunk
+                .par_iter()
+                .map(|&(group, item)| self.pairs.pair(group, item))
+                .collect::<Result<_, _>>()?;
+            let answers: Vec<Vec<Found>> =
+                self.methods.iter().map(|(_, method)| self.register(method, &pairs)).collect();
+            let scored: Vec<PairRecord> = (0..chunk.len())
+                .into_par_iter()
+                .map(|i| {
+                    let found: Vec<&Found> = answers.iter().map(|of_method| &of_method[i]).collect();
+                    self.record(chunk[i], &pairs[i], &found)
+                })
+                .collect();
+            records.extend(scored);
+            let last = chunk.last().map_or(String::new(), |&(group, _)| groups[group].name());
+            after_chunk(chunk.len(), &last);
+        }
+        Ok(Outcome { groups: groups.to_vec(), rows: self.rows.clone(), records })
+    }
+
+    /// One method on the pairs of a chunk: batch after batch where the method spreads over the
+    /// cores itself, side by side where it does not.
+    fn register(&self, method: &Method, pairs: &[EvalPair]) -> Vec<Found> {
+        let call = |batch: &[EvalPair]| -> Vec<Found> {
+            let clouds: Vec<_> = batch.iter().map(|p| (&p.pair.source, &p.pair.target)).collect();
+            let start = Instant::now();
+            let answers = method.register.register_batch(&clouds);
+            let seconds = start.elapsed().as_secs_f64() / batch.len() as f64;
+            answers.into_iter().map(|a| Found { answer: a.map_err(|e| e.to_string()), seconds }).collect()
+        };
+        if method.parallel_inside {
+            pairs.chunks(self.batch.max(1)).flat_map(call).collect()
+        } else {
+            pairs.par_chunks(pairs.len().div_ceil(self.threads.max(1))).flat_map_iter(call).collect()
+        }
+    }
+
+    /// Scores all rows on one pair.
+    fn record(&self, (group, item): (usize, usize), pair: &EvalPair, found: &[&Found]) -> PairRecord {
+        let clean = pair.clean.as_ref().and_then(|points| CleanShape::new(points).ok());
+        let answers = self.rows.iter().map(|row| {
+            let mut answer = self.answer(row, group, item, pair, found);
+            let pose = answer.pose.unwrap_or_else(Rigid::identity);
+            let truth = &pair.pair.target_from_source;
+            answer.error.chamfer = clean
+                .as_ref()
+                .map(|shape| shape.modified_chamfer(&pair.pair.source, &pair.pair.target, &pose, truth));
+            answer
+        });
+        PairRecord {
+            group,
+            item,
+            id: pair.pair.id.clone(),
+            class: pair.pair.class.clone(),
+            symmetric: pair.pair.symmetric,
+            truth: pair.pair.target_from_source,
+            answers: answers.collect(),
+        }
+    }
+
+    /// The answer of the row of this name: a method, one of its branches, the oracle, or a file.
+    fn answer(&self, row: &str, group: usize, item: usize, pair: &EvalPair, found: &[&Found]) -> Answer {
+        let truth = &pair.pair.target_from_source;
+        if row == ORACLE {
+            let start = Instant::now();
+            let pose = oracle_pose(&pair.pair);
+            let seconds = Some(start.elapsed().as_secs_f64());
+            let failure = pose.is_none().then(|| "the correspondences determine no pose".to_owned());
+            return Answer { seconds, ..Answer::new(pose, failure, truth) };
+        }
+        if let Some(file) = self.transforms.iter().find(|t| t.name == row) {
+            let pose = file.poses[group][item];
+            return Answer::new(pose, pose.is_none().then(|| "the file holds no pose".to_owned()), truth);
+        }
+        let filled = self.methods.iter().zip(found).find(|((rows, _), _)| rows.contains(&row));
+        let Some(((_, method), found)) = filled else {
+            return Answer::new(None, Some(format!("no method fills the row {row}")), truth);
+        };
+        let seconds = Some(found.seconds);
+        let registration = match &found.answer {
+            Ok(registration) => registration,
+            Err(failure) => return Answer { seconds, ..Answer::new(None, Some(failure.clone()), truth) },
+        };
+        let (pose, failure) = match pose_of_row(registration, method.register.name(), row) {
+            Some(pose) if is_finite(&pose) => (Some(pose), None),
+            Some(_) => (None, Some("the pose is not finite".to_owned())),
+            None => (None, Some("the method gave no pose for this branch".to_owned())),
+        };
+        Answer {
+            seconds,
+            iterations: Some(registration.iterations),
+            converged: Some(registration.converged),
+            ..Answer::new(pose, failure, truth)
+        }
+    }
+}
+
+/// What a method answered, and how long it took.
+struct Found {
+    answer: Result<Registration, String>,
+    seconds: f64,
+}
+
+/// The pose of the row `<method>`, or of the branch in the row `<method>-<branch>`.
+fn pose_of_row(registration: &Registration, method: &str, row: &str) -> Option<Rigid> {
+    if row == method {
+        return Some(registration.target_from_source);
+    }
+    let branch = row.strip_prefix(method)?.strip_prefix('-')?;
+    registration.branches.iter().find(|b| b.name == branch).map(|b| b.target_from_source)
+}
+
+impl Answer {
+    fn new(pose: Option<Rigid>, failure: Option<String>, truth: &Rigid) -> Self {
+        let error = PairError::new(pose.as_ref(), truth);
+        Self { error, pose, failure, iterations: None, converged: None, seconds: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use srrf_cloud::{Branch, PointCloud, Register, RegisterError};
+    use srrf_corrupt::{CorruptionKind, PairConfig, Severity};
+
+    use super::*;
+    use crate::data;
+    use crate::synthesized::{Protocol, SynthesizedPairs};
+
+    /// Answers the identity with two branches; fails on clouds whose first source coordinate is
+    /// positive.
+    struct Moody;
+
+    impl Register for Moody {
+        fn name(&self) -> &str {
+            "moody"
+        }
+
+        fn register(&self, source: &PointCloud, _: &PointCloud) -> Result<Registration, RegisterError> {
+            if source.points()[0][0] > 0.0 {
+                return Err(RegisterError::NoPose("not today".into()));
+            }
+            let mut broken = Rigid::identity();
+            broken.rotation[(0, 0)] = f64::NAN;
+            let branch = |name, target_from_source| Branch { name, target_from_source, inlier_ratio: 0.0 };
+            let branches = vec![branch("left", Rigid::identity()), branch("right", broken)];
+            Ok(Registration { branches, ..Registration::from_pose(Rigid::identity()) })
+        }
+    }
+
+    const ROWS: &[&str] = &["moody-left", "moody-right", "moody"];
+
+    fn pairs() -> SynthesizedPairs {
+        let protocol = Protocol {
+            clean: true,
+            corruptions: vec![CorruptionKind::Shear],
+            severities: vec![Severity::ALL[2]],
+            shapes: 11,
+            seed: 3,
+            pair: PairConfig { points: 129, ..PairConfig::default() },
+            dcp_poses: false,
+        };
+        SynthesizedPairs::new(data::procedural(11).unwrap(), protocol).unwrap()
+    }
+
+    fn run(pairs: &SynthesizedPairs, batch: usize, threads: usize, parallel_inside: bool) -> Outcome {
+        let moody = Method { register: Box::new(Moody), weights: None, parallel_inside };
+        let icp = crate::methods::METHODS.iter().find(|m| m.name == "icp").unwrap();
+        let methods = vec![(ROWS, moody), (icp.rows, (icp.build)(&Default::default()).unwrap())];
+        let rows = ["icp", ORACLE, "moody-left", "moody-right", "moody"].map(str::to_owned).to_vec();
+        let run = Run { pairs, methods, transforms: vec![], rows, batch, threads };
+        let mut done = 0;
+        let outcome = run.execute(&mut |pairs, _| done += pairs).unwrap();
+        assert_eq!(done, 22);
+        outcome
+    }
+
+    #[test]
+    fn threads_and_batches_change_nothing() {
+        let pairs = pairs();
+        let one = run(&pairs, 1, 1, false);
+        for (batch, threads, parallel_inside) in [(4, 2, false), (3, 2, true), (100, 3, false)] {
+            let other = run(&pairs, batch, threads, parallel_inside);
+            for (a, b) in one.records.iter().zip(&other.records) {
+                assert_eq!((a.group, a.item, &a.id), (b.group, b.item, &b.id));
+                for (a, b) in a.answers.iter().zip(&b.answers) {
+                    assert_eq!((a.pose, a.error), (b.pose, b.error));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn branches_failures_and_the_oracle_are_scored() {
+        let outcome = run(&pairs(), 5, 2, false);
+        let (mut failed, mut answered) = (0, 0);
+        for record in &outcome.records {
+            let [_, oracle, left, right, moody] = &record.answers[..] else { panic!() };
+            assert!(right.error.failed, "NaN is a failure");
+            assert_eq!(left.pose, moody.pose);
+            if moody.error.failed {
+                assert!(moody.failure.as_ref().unwrap().contains("not today"));
+                failed += 1;
+            } else {
+                assert!(right.failure.as_ref().unwrap().contains("not finite"));
+                answered += 1;
+            }
+            assert!(!oracle.error.failed);
+            if record.group == 0 {
+                assert!(oracle.error.rotation_deg < 1e-6, "exact on clean pairs");
+                assert!(oracle.error.chamfer.unwrap() < 1e-12);
+            }
+        }
+        assert!(failed > 0 && answered > 0);
+    }
+}

@@ -1,0 +1,278 @@
+//! The summary: scores per corruption or group, severity and method.
+
+use serde::{Serialize, Serializer};
+
+use crate::EvalError;
+use crate::metrics::{PairError, Scores};
+use crate::run::Outcome;
+
+/// Which severities a row of the summary covers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SeverityKey {
+    /// One severity; 0 for clean pairs and groups of a file.
+    One(u8),
+    /// The mean over the severities that were run.
+    Mean,
+}
+
+impl std::fmt::Display for SeverityKey {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::One(severity) => severity.fmt(f),
+            Self::Mean => f.write_str("mean"),
+        }
+    }
+}
+
+impl Serialize for SeverityKey {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::One(severity) => serializer.serialize_u8(*severity),
+            Self::Mean => serializer.serialize_str("mean"),
+        }
+    }
+}
+
+/// One row of the summary.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SummaryRow {
+    /// The corruption, `clean`, or the group of a file.
+    pub corruption: String,
+    /// A number, or `mean`: the mean of the values of the severities.
+    pub severity: SeverityKey,
+    /// The method.
+    pub method: String,
+    /// Scores over all pairs.
+    #[serde(flatten)]
+    pub scores: Scores,
+    /// Mean time of one pair, in seconds; `None` for transforms from a file.
+    pub seconds_per_pair: Option<f64>,
+    /// Scores without the classes that are symmetric about an axis; `None` where all are.
+    pub no_symmetric: Option<Scores>,
+}
+
+/// All rows: corruption by corruption; in each the severities, then their mean; in each the methods
+/// in the order of the tables.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(transparent)]
+pub struct Summary {
+    /// The rows.
+    pub rows: Vec<SummaryRow>,
+}
+
+impl Summary {
+    /// Sums up a run.
+    ///
+    /// # Errors
+    /// [`EvalError::Metric`] where a true pose is not finite.
+    pub fn of(outcome: &Outcome) -> Result<Self, EvalError> {
+        let mut rows: Vec<SummaryRow> = Vec::new();
+        let mut start = 0;
+        while start < outcome.groups.len() {
+            let corruption = &outcome.groups[start].corruption;
+            let end = outcome.groups[start..]
+                .iter()
+                .position(|g| g.corruption != *corruption)
+                .map_or(outcome.groups.len(), |n| start + n);
+            let first = rows.len();
+            for group in start..end {
+                for method in 0..outcome.rows.len() {
+                    rows.push(row(outcome, group, method)?);
+                }
+            }
+            for method in &outcome.rows {
+                let of_method: Vec<&SummaryRow> =
+                    rows[first..].iter().filter(|r| r.method == *method).collect();
+                rows.extend(mean(&of_method));
+            }
+            start = end;
+        }
+        Ok(Self { rows })
+    }
+
+    /// The row of these keys.
+    pub fn get(&self, corruption: &str, severity: SeverityKey, method: &str) -> Option<&SummaryRow> {
+        self.rows.iter().find(|r| r.corruption == corruption && r.severity == severity && r.method == method)
+    }
+
+    /// The corruptions or groups, in order.
+    pub fn corruptions(&self) -> Vec<&str> {
+        distinct(self.rows.iter().map(|r| r.corruption.as_str()))
+    }
+
+    /// The methods, in order.
+    pub fn methods(&self) -> Vec<&str> {
+        distinct(self.rows.iter().map(|r| r.method.as_str()))
+    }
+
+    /// The severities above 0, ascending.
+    pub fn severities(&self) -> Vec<u8> {
+        let mut severities: Vec<u8> = self
+            .rows
+            .iter()
+            .filter_map(|r| match r.severity {
+                SeverityKey::One(s) if s > 0 => Some(s),
+                _ => None,
+            })
+            .collect();
+        severities.sort_unstable();
+        severities.dedup();
+        severities
+    }
+}
+
+fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut seen = Vec::new();
+    names.for_each(|name| {
+        if !seen.contains(&name) {
+            seen.push(name)
+        }
+    });
+    seen
+}
+
+/// One group and method.
+fn row(outcome: &Outcome, group: usize, method: usize) -> Result<SummaryRow, EvalError> {
+    let of_group = || outcome.records.iter().filter(|r| r.group == group);
+    let errors: Vec<PairError> = of_group().map(|r| r.answers[method].error).collect();
+    let asymmetric: Vec<PairError> =
+        of_group().filter(|r| !r.symmetric).map(|r| r.answers[method].error).collect();
+    let seconds: Vec<f64> = of_group().filter_map(|r| r.answers[method].seconds).collect();
+    let scores = |errors: &[PairError]| {
+        Scores::from_errors(errors).map_err(|source| EvalError::Metric {
+            group: outcome.groups[group].name(),
+            method: outcome.rows[method].clone(),
+            source,
+        })
+    };
+    Ok(SummaryRow {
+        corruption: outcome.groups[group].corruption.clone(),
+        severity: SeverityKey::One(outcome.groups[group].severity),
+        method: outcome.rows[method].clone(),
+        scores: scores(&errors)?,
+        seconds_per_pair: (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64),
+        no_symmetric: (!asymmetric.is_empty()).then(|| scores(&asymmetric)).transpose()?,
+    })
+}
+
+/// The mean over severities of one method.
+fn mean(rows: &[&SummaryRow]) -> Option<SummaryRow> {
+    let first = rows.first()?;
+    let scores: Vec<Scores> = rows.iter().map(|r| r.scores).collect();
+    let asymmetric: Vec<Scores> = rows.iter().filter_map(|r| r.no_symmetric).collect();
+    let seconds: Vec<f64> = rows.iter().filter_map(|r| r.seconds_per_pair).collect();
+    Some(SummaryRow {
+        corruption: first.corruption.clone(),
+        severity: SeverityKey::Mean,
+        method: first.method.clone(),
+        scores: Scores::mean(&scores)?,
+        seconds_per_pair: (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64),
+        no_symmetric: Scores::mean(&asymmetric),
+    })
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use srrf_cloud::{EulerXyz, Rigid};
+
+    use super::*;
+    use crate::pairs::Group;
+    use crate::run::{Answer, PairRecord};
+
+    /// Clean and cutout at severities 1 and 3, two pairs each, one of them symmetric. Method `a` is
+    /// off by 1 degree per severity (2 on symmetric shapes), `b` by 10 times as much.
+    pub(crate) fn outcome() -> Outcome {
+        let group = |corruption: &str, severity| Group { corruption: corruption.into(), severity, pairs: 2 };
+        let groups = vec![group("clean", 0), group("cutout", 1), group("cutout", 3)];
+        let mut records = Vec::new();
+        for (index, group) in groups.iter().enumerate() {
+            for item in 0..2 {
+                let symmetric = item == 1;
+                let answers = [1.0, 10.0].map(|scale| {
+                    let angle = scale * f64::from(group.severity) * if symmetric { 2.0 } else { 1.0 };
+                    let rotation = EulerXyz::from_deg([angle, 0.0, 0.0]).to_matrix();
+                    let pose = Rigid { rotation, ..Rigid::identity() };
+                    Answer {
+                        error: PairError::new(Some(&pose), &Rigid::identity()),
+                        pose: Some(pose),
+                        failure: None,
+                        iterations: Some(4),
+                        converged: Some(true),
+                        seconds: Some(0.5),
+                    }
+                });
+                records.push(PairRecord {
+                    group: index,
+                    item,
+                    id: format!("shape_{item}"),
+                    class: if symmetric { "vase".into() } else { "chair".into() },
+                    symmetric,
+                    truth: Rigid::identity(),
+                    answers: answers.to_vec(),
+                });
+            }
+        }
+        Outcome { groups, rows: vec!["a".into(), "b".into()], records }
+    }
+
+    #[test]
+    fn rows_severities_means_and_symmetry() {
+        let summary = Summary::of(&outcome()).unwrap();
+        let keys: Vec<String> =
+            summary.rows.iter().map(|r| format!("{} {} {}", r.corruption, r.severity, r.method)).collect();
+        assert_eq!(
+            keys,
+            [
+                "clean 0 a",
+                "clean 0 b",
+                "clean mean a",
+                "clean mean b",
+                "cutout 1 a",
+                "cutout 1 b",
+                "cutout 3 a",
+                "cutout 3 b",
+                "cutout mean a",
+                "cutout mean b"
+            ]
+        );
+        let at = |severity| summary.get("cutout", severity, "a").unwrap();
+        let three = at(SeverityKey::One(3));
+        assert!((three.scores.mean_rot_deg - 4.5).abs() < 1e-9);
+        assert!((three.no_symmetric.unwrap().mean_rot_deg - 3.0).abs() < 1e-9);
+        assert_eq!((three.scores.pairs, three.no_symmetric.unwrap().pairs), (2, 1));
+        let mean = at(SeverityKey::Mean);
+        assert!(
+            (mean.scores.rmse_r - (at(SeverityKey::One(1)).scores.rmse_r + three.scores.rmse_r) / 2.0).abs()
+                < 1e-12
+        );
+        assert_eq!(mean.seconds_per_pair, Some(0.5));
+        assert_eq!(summary.corruptions(), ["clean", "cutout"]);
+        assert_eq!(summary.severities(), [1, 3]);
+    }
+
+    #[test]
+    fn the_fields_that_readers_rely_on() {
+        let summary = Summary::of(&outcome()).unwrap();
+        let json = serde_json::to_value(&summary).unwrap();
+        let (first, mean) = (&json[0], &json[2]);
+        assert_eq!(first["severity"], 0);
+        assert_eq!(mean["severity"], "mean");
+        for field in [
+            "corruption",
+            "method",
+            "mse_r",
+            "rmse_r",
+            "mae_r",
+            "mse_t",
+            "rmse_t",
+            "mae_t",
+            "median_rot_deg",
+            "recall",
+            "pairs",
+            "seconds_per_pair",
+        ] {
+            assert!(!first[field].is_null() && !mean[field].is_null(), "{field}");
+        }
+        assert_eq!(first["no_symmetric"]["pairs"], 1);
+    }
+}

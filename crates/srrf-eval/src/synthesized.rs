@@ -1,0 +1,231 @@
+//! Pairs made from shapes: clean ones, and each corruption at each severity.
+
+use serde::Serialize;
+use srrf_cloud::source::ShapeSource;
+use srrf_corrupt::{
+    CorruptionKind, Normalize, PairConfig, PairSynthesizer, PoseDraw, Purpose, RotationRange, Sampling,
+    Severity, Stream,
+};
+
+use crate::EvalError;
+use crate::pairs::{EvalPair, Group, PairSource};
+
+/// Name of the group of pairs without corruption.
+pub const CLEAN: &str = "clean";
+
+/// Which pairs are made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Protocol {
+    /// Whether pairs without corruption are among them.
+    pub clean: bool,
+    /// Corruptions, in the order of the report.
+    pub corruptions: Vec<CorruptionKind>,
+    /// Severities of each corruption.
+    pub severities: Vec<Severity>,
+    /// Number of shapes; all where the source has fewer.
+    pub shapes: usize,
+    /// Seed of the pairs.
+    pub seed: u64,
+    /// How a pair is made.
+    pub pair: PairConfig,
+    /// Whether shape `i` has the pose of item `i` of DCP's test set instead of a seeded one.
+    pub dcp_poses: bool,
+}
+
+/// Pairs made on demand. Pair `item` is derived from the seed and the number of its shape alone, so
+/// that threads, batches and the number of shapes change nothing; all groups show a shape in the
+/// same pose.
+pub struct SynthesizedPairs {
+    source: Box<dyn ShapeSource>,
+    /// Numbers of the shapes, spread evenly over the source.
+    shapes: Vec<usize>,
+    synthesizer: PairSynthesizer,
+    protocol: Protocol,
+    conditions: Vec<Option<(CorruptionKind, Severity)>>,
+    groups: Vec<Group>,
+}
+
+impl SynthesizedPairs {
+    /// Pairs of `source` by `protocol`.
+    ///
+    /// # Errors
+    /// [`EvalError::Usage`] where the protocol names no pairs or makes no sense.
+    pub fn new(source: Box<dyn ShapeSource>, protocol: Protocol) -> Result<Self, EvalError> {
+        let synthesizer = PairSynthesizer::new(protocol.pair)
+            .map_err(|e| EvalError::Usage(format!("pairs cannot be made so: {e}")))?;
+        let count = protocol.shapes.min(source.len());
+        let shapes: Vec<usize> = (0..count).map(|i| i * source.len() / count).collect();
+        let clean = protocol.clean.then_some(None);
+        let corrupted = protocol
+            .corruptions
+            .iter()
+            .flat_map(|&kind| protocol.severities.iter().map(move |&severity| Some((kind, severity))));
+        let conditions: Vec<_> = clean.into_iter().chain(corrupted).collect();
+        if conditions.is_empty() || shapes.is_empty() {
+            return Err(EvalError::Usage(
+                "no pairs to score: at least one shape, and `clean` or a corruption with a severity are needed"
+                    .into(),
+            ));
+        }
+        let groups = conditions
+            .iter()
+            .map(|condition| Group {
+                corruption: condition.map_or(CLEAN.into(), |(kind, _)| kind.name().into()),
+                severity: condition.map_or(0, |(_, severity)| severity.get()),
+                pairs: shapes.len(),
+            })
+            .collect();
+        Ok(Self { source, shapes, synthesizer, protocol, conditions, groups })
+    }
+}
+
+impl SynthesizedPairs {
+    /// The points from which the pair was made. `None` with box normalisation, which moves and scales
+    /// clouds against their clean shape.
+    fn clean(&self, shape: usize, stream: Stream) -> Result<Option<Vec<[f64; 3]>>, EvalError> {
+        let config = &self.protocol.pair;
+        if config.normalize != Normalize::None {
+            return Ok(None);
+        }
+        // The synthesizer draws its points from the same stream.
+        let mut rng = stream.rng(Purpose::Base);
+        let points = match config.sampling {
+            Sampling::Shared => self.source.sample(shape, config.points, &mut rng)?.into_points(),
+            Sampling::Independent => {
+                let (source, target) = self.source.sample_two(shape, config.points, &mut rng)?;
+                [source.into_points(), target.into_points()].concat()
+            }
+        };
+        Ok(Some(points))
+    }
+}
+
+/// The name of a switch of [`PairConfig`] as in configs and options.
+fn word(switch: impl Serialize) -> String {
+    let value = serde_json::to_value(switch).ok();
+    value.as_ref().and_then(|v| v.as_str()).unwrap_or_default().to_owned()
+}
+
+impl PairSource for SynthesizedPairs {
+    fn description(&self) -> String {
+        let pair = &self.protocol.pair;
+        let poses = match pair.rotation {
+            _ if self.protocol.dcp_poses => "DCP's test poses".to_owned(),
+            RotationRange::EulerAxes { max_deg } => {
+                format!("Euler angles in [0, {max_deg}] degrees, translation within {}", pair.translation)
+            }
+            RotationRange::So3 => format!("all rotations, translation within {}", pair.translation),
+        };
+        format!(
+            "{}; {} shapes scored; corrupt {}, sampling {}, normalize {}, {} points; {poses}",
+            self.source.description(),
+            self.shapes.len(),
+            word(pair.corrupt),
+            word(pair.sampling),
+            word(pair.normalize),
+            pair.points,
+        )
+    }
+
+    fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    fn has_oracle(&self) -> bool {
+        self.protocol.pair.sampling == Sampling::Shared && self.protocol.pair.keep_correspondence
+    }
+
+    fn pair(&self, group: usize, item: usize) -> Result<EvalPair, EvalError> {
+        let shape = self.shapes[item];
+        let stream = Stream { seed: self.protocol.seed, item: shape as u64 };
+        let pose = if self.protocol.dcp_poses { PoseDraw::DcpTest(shape as u32) } else { PoseDraw::Seeded };
+        let pair =
+            self.synthesizer.pair(&*self.source, shape, self.conditions[group], pose, stream).map_err(
+                |e| EvalError::Pair { group: self.groups[group].name(), item, problem: e.to_string() },
+            )?;
+        Ok(EvalPair { pair, clean: self.clean(shape, stream)? })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use srrf_corrupt::Corrupt;
+
+    use super::*;
+    use crate::data;
+
+    fn protocol() -> Protocol {
+        Protocol {
+            clean: true,
+            corruptions: vec![CorruptionKind::Gaussian, CorruptionKind::Cutout],
+            severities: vec![Severity::ALL[0], Severity::ALL[4]],
+            shapes: 3,
+            seed: 7,
+            pair: PairConfig { points: 65, ..PairConfig::default() },
+            dcp_poses: false,
+        }
+    }
+
+    fn pairs(protocol: Protocol) -> SynthesizedPairs {
+        SynthesizedPairs::new(data::procedural(protocol.shapes).unwrap(), protocol).unwrap()
+    }
+
+    #[test]
+    fn groups_are_clean_and_each_corruption_at_each_severity() {
+        let pairs = pairs(protocol());
+        let names: Vec<String> = pairs.groups().iter().map(Group::name).collect();
+        assert_eq!(names, ["clean", "gaussian_s1", "gaussian_s5", "cutout_s1", "cutout_s5"]);
+        assert!(pairs.groups().iter().all(|g| g.pairs == 3));
+        assert!(pairs.has_oracle());
+        assert!(pairs.description().contains("corrupt both, sampling shared, normalize none, 65 points"));
+    }
+
+    #[test]
+    fn a_pair_depends_on_seed_and_item_alone() {
+        let few = pairs(protocol());
+        let only_cutout =
+            pairs(Protocol { clean: false, corruptions: vec![CorruptionKind::Cutout], ..protocol() });
+        let (a, b) = (few.pair(4, 2).unwrap(), only_cutout.pair(1, 2).unwrap());
+        assert_eq!(a.pair, b.pair);
+        assert_eq!(a.clean, b.clean);
+        let other = pairs(Protocol { seed: 8, ..protocol() });
+        assert_ne!(other.pair(4, 2).unwrap().pair.target_from_source, a.pair.target_from_source);
+        // One shape keeps its pose through all groups.
+        let clean = few.pair(0, 2).unwrap();
+        assert_eq!(clean.pair.target_from_source, a.pair.target_from_source);
+    }
+
+    #[test]
+    fn the_clean_shape_is_the_one_the_pair_was_made_from() {
+        let target_only =
+            Protocol { pair: PairConfig { corrupt: Corrupt::Target, ..protocol().pair }, ..protocol() };
+        let pair = pairs(target_only).pair(2, 1).unwrap();
+        let sorted = |mut points: Vec<[f64; 3]>| {
+            points.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            points
+        };
+        assert_eq!(sorted(pair.clean.unwrap()), sorted(pair.pair.source.into_points()));
+        let boxed = Protocol {
+            pair: PairConfig { normalize: Normalize::Canonical, ..protocol().pair },
+            ..protocol()
+        };
+        assert_eq!(pairs(boxed).pair(2, 1).unwrap().clean, None);
+    }
+
+    #[test]
+    fn dcp_poses_are_those_of_the_shape_number() {
+        let pairs = pairs(Protocol { dcp_poses: true, ..protocol() });
+        let pose = pairs.pair(0, 2).unwrap().pair.target_from_source;
+        assert_eq!(pose, srrf_corrupt::dcp_test_pose(2));
+    }
+
+    #[test]
+    fn no_pairs_is_an_error() {
+        let nothing = Protocol { clean: false, corruptions: vec![], ..protocol() };
+        let error = SynthesizedPairs::new(data::procedural(3).unwrap(), nothing).err().unwrap();
+        assert_eq!(error.exit_code(), 2);
+        let two_points = Protocol { pair: PairConfig { points: 2, ..PairConfig::default() }, ..protocol() };
+        let error = SynthesizedPairs::new(data::procedural(3).unwrap(), two_points).err().unwrap();
+        assert!(error.to_string().contains("at least 3 points"), "{error}");
+    }
+}

@@ -1,0 +1,97 @@
+//! Every bad input is a clear message and exit code 2.
+
+mod common;
+
+use std::fs;
+
+use common::{command, refusal, run};
+
+#[test]
+fn bad_options_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let check = |arguments: &[&str], parts: &[&str]| {
+        let message = refusal(folder.path(), arguments);
+        for part in parts {
+            assert!(message.contains(part), "{arguments:?}: `{part}` is missing in {message}");
+        }
+    };
+    check(&["--corruptions", "rain"], &["`rain`", "cutout", "clean"]);
+    check(&["--severities", "9"], &["severity 9", "1, 2, 3, 4 and 5"]);
+    check(&["--severities", "0"], &["severity 0"]);
+    check(&["--methods", "magic"], &["`magic`", "identity, icp"]);
+    check(&["--shapes", "0"], &["--shapes 0"]);
+    check(&["--points", "2"], &["at least 3 points"]);
+    check(&["--threads", "0"], &["--threads 0"]);
+    check(&["--rotation", "wide"], &["--rotation wide", "so3"]);
+    check(&["--translation", "NaN"], &["translation"]);
+    check(&["--corrupt", "neither"], &["neither", "both"]);
+    check(&["--independent", "--methods", "oracle"], &["oracle", "--sampling shared"]);
+    check(&["--unknown"], &["--unknown"]);
+}
+
+#[test]
+fn missing_data_say_where_and_what_works_without() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = refusal(folder.path(), &["--data", "nowhere"]);
+    for part in ["nowhere", "--data", "accepted layouts", "cargo run -p srrf-eval"] {
+        assert!(message.contains(part), "`{part}` is missing in {message}");
+    }
+    fs::create_dir(folder.path().join("empty")).unwrap();
+    assert!(refusal(folder.path(), &["--data", "empty"]).contains("accepted layouts"));
+    let output = command(folder.path(), &["--shapes", "1"]).env("SRRF_DATA", "elsewhere").output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("elsewhere") && message.contains("SRRF_DATA"), "{message}");
+}
+
+#[test]
+fn damaged_data_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("ply_data_test0.h5"), b"\x89HDF\r\n\x1a\n and then nothing").unwrap();
+    let message = refusal(folder.path(), &["--data", "."]);
+    assert!(message.contains("ply_data_test0.h5"), "{message}");
+}
+
+#[test]
+fn bad_pair_files_and_transforms_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(refusal(folder.path(), &["--pairs", "none.npz"]).contains("none.npz"));
+    fs::write(folder.path().join("text.npz"), "text").unwrap();
+    assert!(refusal(folder.path(), &["--pairs", "text.npz"]).contains("not an .npz archive"));
+    let message = refusal(folder.path(), &["--pairs", "text.npz", "--corruptions", "cutout"]);
+    assert!(message.contains("--corruptions"), "{message}");
+
+    let made = run(
+        folder.path(),
+        &[
+            "--shapes",
+            "2",
+            "--points",
+            "64",
+            "--clean-only",
+            "--methods",
+            "identity",
+            "--export-pairs",
+            "p.npz",
+        ],
+    );
+    assert!(made.status.success());
+    let whole = fs::read(folder.path().join("p.npz")).unwrap();
+    fs::write(folder.path().join("cut.npz"), &whole[..whole.len() / 2]).unwrap();
+    assert!(refusal(folder.path(), &["--pairs", "cut.npz"]).contains("cut.npz"));
+    let pairs = ["--pairs", "p.npz", "--methods", "identity", "--transforms"];
+    fs::write(folder.path().join("t.json"), "{\"clean\": []}").unwrap();
+    let message = refusal(folder.path(), &[&pairs[..], &["t.json"]].concat());
+    assert!(message.contains("t.json") && message.contains("0 transforms for 2 pairs"), "{message}");
+    fs::write(folder.path().join("icp.json"), "[null, null]").unwrap();
+    let message = refusal(folder.path(), &[&pairs[..], &["icp.json"]].concat());
+    assert!(message.contains("`icp`") && message.contains("rename"), "{message}");
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_is_refused_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("file"), "").unwrap();
+    let message = refusal(folder.path(), &["--out", "file/report"]);
+    assert!(message.contains("file/report") && message.contains("--out"), "{message}");
+}
