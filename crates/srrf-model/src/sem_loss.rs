@@ -107,11 +107,12 @@ fn point_to_sphere(clouds: Tensor<3>, points: Tensor<3>, radii: Tensor<2>) -> Te
     to_sphere + to_cloud
 }
 
-/// Mean distance between skeleton points of the same number, over the (detached) spread of the
-/// target skeleton.
+/// Mean distance between skeleton points of the same number, over the spread of the target
+/// skeleton. The spread is on the graph: without its gradient, shrinking the skeleton would be the
+/// cheapest way to lower the loss.
 fn index_match(posed: Tensor<3>, target: Tensor<3>) -> Tensor<1> {
     let [batch, m, _] = target.dims();
-    let spread = spread(target.clone().detach()).clamp_min(1e-3);
+    let spread = spread(target.clone()).clamp_min(1e-3);
     distance((posed - target).reshape([batch * m, 3])).mean() / spread
 }
 

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use burn::tensor::Device;
 use clap::Parser;
+use srrf_cloud::shapes::ProceduralShapes;
 use srrf_cloud::source::{ACCEPTED_LAYOUTS, ShapeSource, Split, open};
 use srrf_train::config::{DataSource, TrainConfig};
 use srrf_train::resources::keep_freed_memory;
@@ -115,7 +116,10 @@ fn cores() -> usize {
 fn shapes(config: &TrainConfig, data: Option<&Path>) -> Result<Box<dyn ShapeSource>, String> {
     const WITHOUT: &str = "to train without a download: srrf-train --config configs/shapes.toml";
     match (config.data.source, data.or(config.data.path.as_deref())) {
-        (DataSource::Shapes, _) => Err("built-in shapes: not yet".into()),
+        (DataSource::Shapes, _) => match ProceduralShapes::new(config.seed, config.data.shapes, None) {
+            Ok(shapes) => Ok(Box::new(shapes)),
+            Err(e) => Err(e.to_string()),
+        },
         (DataSource::Modelnet, Some(path)) => open(path, Split::Train).map_err(|e| format!("{e}\n{WITHOUT}")),
         (DataSource::Modelnet, None) => Err(format!(
             "this configuration trains on ModelNet40; say where it is by --data PATH, $SRRF_DATA or `data.path`. \

@@ -1,0 +1,142 @@
+//! Training through its front door: resume, kill, threads, bad input, a full disk.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use safetensors::SafeTensors;
+use srrf_tests::{program, refuses, run};
+
+const CONFIG: &str = "configs/smoke.toml";
+
+/// Every tensor of a checkpoint that belongs to the network, as bytes.
+fn parameters(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let bytes = std::fs::read(folder.join("checkpoint.safetensors")).unwrap();
+    let tensors = SafeTensors::deserialize(&bytes).unwrap();
+    let model = tensors.tensors().into_iter().filter(|(name, _)| name.starts_with("model."));
+    let found: BTreeMap<_, _> = model.map(|(name, view)| (name, view.data().to_vec())).collect();
+    assert!(found.len() > 50, "a network has parameters");
+    found
+}
+
+fn train(folder: &Path, more: &[&str]) {
+    let folder = folder.to_str().unwrap();
+    let (code, said) = run("srrf-train", &[&["--config", CONFIG, "--run", folder], more].concat());
+    assert_eq!(code, 0, "{said}");
+}
+
+#[test]
+fn killed_and_resumed_with_other_threads_equals_one_session() {
+    let scratch = tempfile::tempdir().unwrap();
+    let straight = scratch.path().join("straight");
+    train(&straight, &["--threads", "2"]);
+
+    let killed = scratch.path().join("killed");
+    let mut child = program("srrf-train")
+        .args(["--config", CONFIG, "--run", killed.to_str().unwrap(), "--threads", "1"])
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    // Kill as soon as there is a checkpoint, wherever the run stands then.
+    let started = Instant::now();
+    while !killed.join("checkpoint.safetensors").exists() {
+        assert!(started.elapsed() < Duration::from_secs(120), "no checkpoint appeared");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    train(&killed, &["--resume", "--threads", "2", "--until-step", "13"]);
+    train(&killed, &["--resume", "--threads", "1"]);
+
+    assert!(parameters(&straight) == parameters(&killed), "the parameters differ");
+    for file in ["best.safetensors", "last.safetensors", "curve.svg", "config.toml", "metrics.jsonl"] {
+        assert!(killed.join(file).metadata().unwrap().len() > 0, "{file}");
+    }
+}
+
+#[test]
+fn a_run_is_not_overwritten_without_a_word() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path().join("run");
+    train(&folder, &["--until-step", "1"]);
+    let path = folder.to_str().unwrap();
+    refuses("srrf-train", &["--config", CONFIG, "--run", path], &[path, "step 1", "--resume", "--restart"]);
+    train(&folder, &["--until-step", "2", "--restart"]);
+}
+
+#[test]
+fn a_checkpoint_of_another_configuration_is_refused() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path().join("run");
+    train(&folder, &["--until-step", "1"]);
+    let text = std::fs::read_to_string(srrf_tests::workspace().join(CONFIG)).unwrap();
+    let other = scratch.path().join("other.toml");
+    std::fs::write(&other, text.replace("skeleton_points = 12", "skeleton_points = 13")).unwrap();
+    let arguments = ["--config", other.to_str().unwrap(), "--run", folder.to_str().unwrap(), "--resume"];
+    refuses("srrf-train", &arguments, &["checkpoint.safetensors", "network.sem.skeleton_points", "another"]);
+
+    // A truncated checkpoint is named, too, and is left where it is.
+    let file = folder.join("checkpoint.safetensors");
+    let bytes = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
+    let arguments = ["--config", CONFIG, "--run", folder.to_str().unwrap(), "--resume"];
+    refuses("srrf-train", &arguments, &["checkpoint.safetensors", "not a usable checkpoint"]);
+    assert_eq!(std::fs::read(&file).unwrap().len(), bytes.len() / 2);
+}
+
+#[test]
+fn bad_configurations_are_refused_by_key() {
+    let scratch = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(srrf_tests::workspace().join(CONFIG)).unwrap();
+    let path = scratch.path().join("bad.toml");
+    let arguments = ["--config", path.to_str().unwrap()];
+    refuses("srrf-train", &arguments, &["bad.toml", "No such file"]);
+    for (from, to, words) in [
+        ("seed = 3", "seed = 3\nsede = 4", &["bad.toml", "unknown field `sede`"][..]),
+        ("batch = 8", "batch = 7", &["bad.toml", "optimizer.batch", "multiple"][..]),
+        ("severities = [1, 3, 5]", "severities = [9]", &["bad.toml", "draw.severities", "1 to 5"][..]),
+        ("clean = 0.1", "clean = 1.5", &["bad.toml", "draw.clean", "between 0 and 1"][..]),
+        ("epochs = 2.4", "epochs = -1", &["bad.toml", "stages[2].epochs"][..]),
+        ("heads = 2, mlp", "heads = 3, mlp", &["bad.toml", "sfe.heads", "divide"][..]),
+        ("kind = \"adam\"", "kind = \"sgd\"", &["bad.toml", "unknown variant `sgd`"][..]),
+    ] {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+        refuses("srrf-train", &arguments, words);
+    }
+}
+
+#[test]
+fn missing_data_say_where_and_what_works_without() {
+    let words = ["--data", "SRRF_DATA", "accepted layouts", "configs/shapes.toml"];
+    refuses("srrf-train", &["--config", "configs/modelnet-small.toml"], &words);
+    let missing = ["--config", "configs/modelnet.toml", "--data", "no/such/folder"];
+    refuses("srrf-train", &missing, &["no/such/folder", "accepted layouts", "configs/shapes.toml"]);
+    refuses("srrf-train", &["--config", CONFIG, "--device", "abacus"], &["abacus", "flex"]);
+}
+
+/// A full disk loses nothing: the run stops with the file's name and the last checkpoint stays.
+/// Needs the right to mount a small tmpfs; says so where it has not.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_said_and_harms_nothing() {
+    let scratch = tempfile::tempdir().unwrap();
+    let disk = scratch.path().join("disk");
+    std::fs::create_dir(&disk).unwrap();
+    let path = disk.to_str().unwrap();
+    let mounted = std::process::Command::new("mount")
+        .args(["-t", "tmpfs", "-o", "size=256k", "tmpfs", path])
+        .output()
+        .is_ok_and(|o| o.status.success());
+    if !mounted {
+        println!("no right to mount a tmpfs here: the full disk was not tested");
+        return;
+    }
+    let (code, said) = run("srrf-train", &["--config", CONFIG, "--run", disk.join("run").to_str().unwrap()]);
+    let unmounted = std::process::Command::new("umount").arg(path).status().unwrap();
+    assert!(unmounted.success());
+    assert!(code == 1 || code == 2, "{code}: {said}");
+    assert!(said.contains("No space left on device") && said.contains(path), "{said}");
+    assert!(!said.contains("panicked"), "{said}");
+}
