@@ -1,6 +1,6 @@
 //! [`Severity`]: how strong a corruption is.
 
-use std::fmt;
+use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 pub struct Severity(u8);
 
 /// A number that is not a severity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("severity {0} does not exist: severities are 1, 2, 3, 4 and 5")]
-pub struct SeverityOutOfRange(pub u8);
+pub struct SeverityOutOfRange(pub String);
 
 impl Severity {
     /// All severities, weakest first.
@@ -33,7 +33,18 @@ impl TryFrom<u8> for Severity {
     type Error = SeverityOutOfRange;
 
     fn try_from(value: u8) -> Result<Self, Self::Error> {
-        if (1..=5).contains(&value) { Ok(Self(value)) } else { Err(SeverityOutOfRange(value)) }
+        if (1..=5).contains(&value) { Ok(Self(value)) } else { Err(SeverityOutOfRange(value.to_string())) }
+    }
+}
+
+impl FromStr for Severity {
+    type Err = SeverityOutOfRange;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        text.parse::<u8>()
+            .ok()
+            .and_then(|n| n.try_into().ok())
+            .ok_or_else(|| SeverityOutOfRange(text.to_owned()))
     }
 }
 
@@ -55,7 +66,8 @@ mod tests {
 
     #[test]
     fn one_to_five() {
-        assert_eq!(Severity::try_from(0), Err(SeverityOutOfRange(0)));
+        assert_eq!(Severity::try_from(0), Err(SeverityOutOfRange("0".into())));
+        assert_eq!("300".parse::<Severity>(), Err(SeverityOutOfRange("300".into())));
         assert!(Severity::try_from(9).unwrap_err().to_string().contains("severity 9"));
         let table = [10, 20, 30, 40, 50];
         for (i, severity) in Severity::ALL.into_iter().enumerate() {
