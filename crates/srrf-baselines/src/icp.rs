@@ -93,7 +93,7 @@ impl Register for Icp {
 }
 
 fn answer(target_from_source: Rigid, converged: bool, iterations: usize) -> Registration {
-    Registration { target_from_source, converged, iterations, branches: Vec::new() }
+    Registration { converged, iterations, ..Registration::from_pose(target_from_source) }
 }
 
 /// Root mean square distance of the points from their centroid.

@@ -67,7 +67,8 @@ pub(crate) fn svg(quantity: &Quantity, summary: &Summary) -> Result<Option<Strin
         let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
         root.fill(&WHITE).map_err(|e| e.to_string())?;
         let (legend, panels) = root.split_vertically(LEGEND_HEIGHT);
-        draw_legend(&legend, quantity.title, &summary.methods()).map_err(|e| e.to_string())?;
+        let title = format!("{} against severity{}", quantity.title, if clean { " (0: clean)" } else { "" });
+        draw_legend(&legend, &title, &summary.methods()).map_err(|e| e.to_string())?;
         for (panel, corruption) in panels.split_evenly((rows, columns)).iter().zip(&corruptions) {
             let curves: Vec<_> = summary.methods().iter().map(|m| curve(corruption, m)).collect();
             let span = (f64::from(first) - 0.2)..(f64::from(last) + 0.2);

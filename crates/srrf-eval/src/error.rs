@@ -89,6 +89,14 @@ pub enum EvalError {
         /// The system's reason.
         source: io::Error,
     },
+    /// The file for exported pairs cannot be made.
+    #[error("cannot write pairs to {path:?}: {source}; choose another file with --export-pairs")]
+    ExportPath {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
     /// A result cannot be written.
     #[error("cannot write {path:?}: {source}")]
     Output {

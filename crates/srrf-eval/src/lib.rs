@@ -30,8 +30,8 @@ mod synthesized;
 mod table;
 mod transforms;
 
-pub use arrays::{Array, ArrayError};
-pub use chamfer::CleanShape;
+pub use arrays::{Array, ArrayError, NpzWriter};
+pub use chamfer::{CleanShape, SkeletonAgreement};
 pub use cli::Options;
 pub use error::EvalError;
 pub use methods::{METHODS, Method, MethodContext, MethodEntry, ORACLE, Selection, all_rows, select};

@@ -172,7 +172,8 @@ pub(crate) fn checked_rotation(matrix: &Matrix3<f64>) -> Result<Matrix3<f64>, St
 impl PairSource for PairFile {
     fn description(&self) -> String {
         let pairs: usize = self.groups.iter().map(|g| g.pairs).sum();
-        format!("{pairs} pairs in {} groups, {}", self.groups.len(), self.path.display())
+        let (groups, path) = (self.groups.len(), self.path.display());
+        format!("{pairs} pairs in {groups} group{}, {path}", if groups == 1 { "" } else { "s" })
     }
 
     fn groups(&self) -> &[Group] {
@@ -232,7 +233,8 @@ fn origins(array: &Array, item: usize) -> Vec<Option<u32>> {
 /// one group differ in size.
 pub fn export(source: &dyn PairSource, path: &Path, after_pair: &mut dyn FnMut()) -> Result<(), EvalError> {
     let io = |source: io::Error| EvalError::Output { path: path.to_owned(), source };
-    let temporary = output::temporary_beside(path).map_err(io)?;
+    let temporary = output::temporary_beside(path)
+        .map_err(|source| EvalError::ExportPath { path: path.to_owned(), source })?;
     let mut npz = NpzWriter::new(io::BufWriter::new(temporary));
     for (index, group) in source.groups().iter().enumerate() {
         let pairs = (0..group.pairs)

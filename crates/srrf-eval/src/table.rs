@@ -16,7 +16,8 @@ pub(crate) fn screen(summary: &Summary) -> String {
 /// `table.md`: `head` (lines of text), then every quantity, then the severities.
 pub(crate) fn markdown(summary: &Summary, head: &str) -> String {
     let mut text = format!("# Registration of corrupted pairs\n\n{head}\n{NOTES}\n");
-    for quantity in &QUANTITIES {
+    let present = |q: &&Quantity| summary.rows.iter().any(|r| (q.value)(&r.scores).is_some());
+    for quantity in QUANTITIES.iter().filter(present) {
         text += &section("## ", quantity, summary, |row| Some(&row.scores));
         text.push('\n');
     }

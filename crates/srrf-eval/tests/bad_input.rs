@@ -94,4 +94,35 @@ fn an_output_folder_that_cannot_be_is_refused_before_the_work() {
     fs::write(folder.path().join("file"), "").unwrap();
     let message = refusal(folder.path(), &["--out", "file/report"]);
     assert!(message.contains("file/report") && message.contains("--out"), "{message}");
+    let export = ["--shapes", "1", "--clean-only", "--export-pairs", "none/pairs.npz"];
+    let message = refusal(folder.path(), &export);
+    assert!(message.contains("none/pairs.npz") && message.contains("--export-pairs"), "{message}");
+}
+
+/// Clouds that determine no rotation are no reason to stop: the method fails on them, and that is
+/// counted.
+#[test]
+fn pairs_that_cannot_be_registered_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let made = common::results(
+        folder.path(),
+        &["--shapes", "1", "--points", "3", "--clean-only", "--methods", "icp,oracle"],
+    );
+    assert_eq!(common::row(&made, "clean", 0, "icp")["pairs"], 1);
+    // Two pairs of 4 points: on a line, and not.
+    let line = [0.0, 1.0, 2.0, 3.0].map(|i| [i, 2.0 * i, -i]);
+    let corner = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut file = srrf_eval::NpzWriter::new(fs::File::create(folder.path().join("few.npz")).unwrap());
+    let clouds = [line, corner].as_flattened().as_flattened().to_vec();
+    file.array("few_x", &[2, 4, 3], &clouds).unwrap();
+    file.array("few_y", &[2, 4, 3], &clouds).unwrap();
+    file.array("few_R", &[2, 3, 3], [identity; 2].as_flattened().as_flattened()).unwrap();
+    file.array("few_t", &[2, 3], &[0.0; 6]).unwrap();
+    file.finish().unwrap();
+    let results = common::results(folder.path(), &["--pairs", "few.npz", "--methods", "icp"]);
+    assert_eq!(common::row(&results, "few", 0, "icp")["failed"], 1);
+    let failure = results["pairs"][0]["methods"]["icp"]["failure"].as_str().unwrap();
+    assert!(failure.contains("one line"), "{failure}");
+    assert_eq!(results["pairs"][1]["methods"]["icp"]["failed"], false);
 }

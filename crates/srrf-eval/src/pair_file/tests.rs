@@ -74,7 +74,7 @@ fn message(change: impl Fn(&mut BTreeMap<&'static str, (Vec<usize>, Vec<f64>)>))
 
 #[test]
 fn bad_arrays_are_named_with_the_fact() {
-    assert!(message(|_| ()).contains("2 pairs in 1 groups"));
+    assert!(message(|_| ()).contains("2 pairs in 1 group,"));
     let text = message(|a| drop(a.remove("g_t")));
     assert!(text.contains("array g_t: is missing; expected shape [2, 3]"), "{text}");
     let text = message(|a| drop(a.insert("g_y", (vec![3, 5, 3], vec![0.5; 45]))));
