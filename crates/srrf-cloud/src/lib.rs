@@ -8,6 +8,7 @@
 mod cloud;
 mod euler;
 mod fps;
+pub mod io;
 mod neighbours;
 mod normals;
 mod register;
