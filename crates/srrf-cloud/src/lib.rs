@@ -15,6 +15,7 @@ mod register;
 mod rigid;
 pub mod shapes;
 pub mod source;
+mod triangles;
 
 pub use cloud::{CloudError, PointCloud, UnitSphere};
 pub use euler::EulerXyz;

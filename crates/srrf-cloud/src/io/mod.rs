@@ -16,6 +16,7 @@ mod text;
 
 pub use atomic::write_atomically;
 pub use error::{FormatError, IoError};
+pub(crate) use text::parse_point;
 
 /// A file format for clouds.
 pub trait CloudFormat: Sync {

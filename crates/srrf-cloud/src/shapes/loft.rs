@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
 
-use super::triangles::Triangles;
+use crate::triangles::Triangles;
 
 /// Corners of a cross-section.
 const SIDES: usize = 24;

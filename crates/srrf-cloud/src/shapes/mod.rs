@@ -5,7 +5,6 @@
 
 use std::sync::OnceLock;
 
-use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 
@@ -19,7 +18,7 @@ mod polygon;
 mod prism;
 mod sketch;
 mod surface;
-mod triangles;
+
 mod tube;
 
 mod abstracts;
@@ -40,6 +39,9 @@ use surface::Surface;
 
 /// Points from which the centre and radius of a shape are estimated.
 const FRAME_POINTS: usize = 4096;
+
+/// Mixed into the seed of those points, so that no sampling repeats them.
+const FRAME_SEED: u64 = 0x5EED_F4A3;
 
 /// A set of procedural shapes.
 ///
@@ -89,26 +91,32 @@ impl ProceduralShapes {
         let frame =
             self.frames.get(index).ok_or(SourceError::NoSuchShape { index, len: self.frames.len() })?;
         let surface = self.surface(index);
-        let frame = *frame.get_or_init(|| {
-            let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ 0x5EED_F4A3);
-            rng.set_stream(index as u64);
-            let points: Vec<Vector3<f64>> =
-                (0..FRAME_POINTS).filter_map(|_| surface.sample(&mut rng)).collect();
-            let centre = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
-            let radius = points.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
-            UnitSphere { centre, radius: if radius > 0.0 { radius } else { 1.0 } }
-        });
+        let frame = match frame.get() {
+            Some(frame) => *frame,
+            None => {
+                let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ FRAME_SEED);
+                rng.set_stream(index as u64);
+                let found = self.draw(&surface, None, index, FRAME_POINTS, &mut rng)?.to_unit_sphere().1;
+                *frame.get_or_init(|| found)
+            }
+        };
         Ok((surface, frame))
     }
 
     fn draw(
         &self,
-        (surface, frame): &(Surface, UnitSphere),
+        surface: &Surface,
+        frame: Option<&UnitSphere>,
         index: usize,
         count: usize,
         rng: &mut ChaCha8Rng,
     ) -> Result<PointCloud, SourceError> {
-        let points = (0..count).filter_map(|_| Some(frame.apply(&surface.sample(rng)?.into()))).collect();
+        let points = (0..count)
+            .filter_map(|_| {
+                let point = surface.sample(rng)?.into();
+                Some(frame.map_or(point, |frame| frame.apply(&point)))
+            })
+            .collect();
         PointCloud::new(points).map_err(|source| SourceError::Shape {
             path: "procedural shapes".into(),
             shape: self.id(index),
@@ -153,7 +161,8 @@ impl ShapeSource for ProceduralShapes {
     }
 
     fn sample(&self, index: usize, count: usize, rng: &mut ChaCha8Rng) -> Result<PointCloud, SourceError> {
-        self.draw(&self.normalised(index)?, index, count, rng)
+        let (surface, frame) = self.normalised(index)?;
+        self.draw(&surface, Some(&frame), index, count, rng)
     }
 
     fn sample_two(
@@ -162,8 +171,9 @@ impl ShapeSource for ProceduralShapes {
         count: usize,
         rng: &mut ChaCha8Rng,
     ) -> Result<(PointCloud, PointCloud), SourceError> {
-        let shape = self.normalised(index)?;
-        Ok((self.draw(&shape, index, count, rng)?, self.draw(&shape, index, count, rng)?))
+        let (surface, frame) = self.normalised(index)?;
+        let first = self.draw(&surface, Some(&frame), index, count, rng)?;
+        Ok((first, self.draw(&surface, Some(&frame), index, count, rng)?))
     }
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::polygon;
-use super::triangles::Triangles;
+use crate::triangles::Triangles;
 
 /// A polygon in the xy plane, extruded along z from 0 to `height`. At the top it is scaled about
 /// the origin by `top_scale` and shifted by `top_shift`.

@@ -3,10 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use crate::CloudError;
+use crate::io::IoError;
 
 /// The layouts that [`crate::source::open`] accepts, for messages.
 pub const ACCEPTED_LAYOUTS: &str = "accepted layouts: \
-     ModelNet40 as HDF5 (ply_data_train0.h5, ... and shape_names.txt; 1,024 or 2,048 points), or one such .h5 file";
+     ModelNet40 as HDF5 (ply_data_train0.h5, ... and shape_names.txt; 1,024 or 2,048 points) or one such .h5 file, \
+     as OFF meshes (class/train/*.off, class/test/*.off), \
+     as resampled text (modelnet40_train.txt, modelnet40_test.txt, class/name.txt), \
+     or a folder of .ply, .off, .xyz, .txt, .csv, .pts and .npy files";
 
 /// Why a source of shapes cannot be opened or sampled.
 #[derive(Debug, thiserror::Error)]
@@ -43,6 +47,9 @@ pub enum SourceError {
         /// What is wrong, and what is expected.
         problem: String,
     },
+    /// A file with a cloud cannot be read.
+    #[error(transparent)]
+    File(#[from] IoError),
     /// A shape is not a usable cloud.
     #[error("{path:?}, shape {shape}: {source}")]
     Shape {

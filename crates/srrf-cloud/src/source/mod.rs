@@ -8,7 +8,10 @@ use rand::rngs::ChaCha8Rng;
 use crate::PointCloud;
 
 mod error;
+mod folder;
 mod modelnet_hdf5;
+mod modelnet_off;
+mod resampled_text;
 mod stored;
 
 pub use error::{ACCEPTED_LAYOUTS, SourceError};
@@ -79,8 +82,10 @@ impl fmt::Display for Split {
 }
 
 /// Opens the shapes at `path`: a data set in one of the accepted layouts ([`ACCEPTED_LAYOUTS`]), a
-/// folder that contains one, or a single HDF5 file (all of whose shapes are taken, whatever the
-/// split).
+/// folder that contains one, or a single file (all of whose shapes are taken, whatever the split).
+///
+/// ModelNet40's clouds and meshes come at mean 0 and radius 1; those of other files stay as they
+/// are. Meshes and text are read from disk at each sampling, HDF5 once.
 ///
 /// # Errors
 /// [`SourceError::NotFound`] where there is nothing of the kind, others for damaged files.
@@ -95,8 +100,18 @@ pub fn open(path: &Path, split: Split) -> Result<Box<dyn ShapeSource>, SourceErr
         if modelnet_hdf5::detect(&candidate) {
             return Ok(Box::new(modelnet_hdf5::open(&candidate, split)?));
         }
+        if resampled_text::detect(&candidate) {
+            return Ok(Box::new(resampled_text::open(&candidate, split)?));
+        }
+        if modelnet_off::detect(&candidate) {
+            return Ok(Box::new(modelnet_off::open(&candidate, split)?));
+        }
     }
-    let looked = "neither the path nor a folder in it has an accepted layout".into();
+    if let Some(folder) = folder::open(path, split)? {
+        return Ok(Box::new(folder));
+    }
+    let looked =
+        "neither the path nor a folder in it has an accepted layout, and there are no files of clouds".into();
     Err(SourceError::NotFound { path: path.to_owned(), looked })
 }
 
