@@ -114,8 +114,9 @@ impl PairBatch {
             .map(|(frame, (r, t))| {
                 let rotation = Rigid::nearest_rotation(&Matrix3::from_row_slice(r))?;
                 let translation = Vector3::from_column_slice(t);
-                translation.iter().all(|v| v.is_finite()).then_some(())?;
-                Some(frame.from_network(&Rigid { rotation, translation }))
+                let pose = frame.from_network(&Rigid { rotation, translation });
+                // Clouds whose coordinates overflow have no scale either.
+                pose.translation.iter().all(|v| v.is_finite()).then_some(pose)
             })
             .collect()
     }
