@@ -1,0 +1,255 @@
+//! Clouds in any unit, anywhere: the frame of a pair, batches, and the network behind the
+//! `Register` seam.
+
+mod common;
+
+use std::collections::BTreeMap;
+
+use burn::tensor::Device;
+use common::{Numbers, difference, tiny, values};
+use nalgebra::Vector3;
+use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid};
+use srrf_model::{PairBatch, PairFrame, SrrfRegister, init, weights};
+
+/// Far from the origin, as map coordinates in metres are.
+const UTM: [f64; 3] = [500_000.0, 4_500_000.0, 120.0];
+
+fn cloud(seed: u64, n: usize) -> PointCloud {
+    let points = Numbers(seed).many(n * 3);
+    PointCloud::new(points.chunks_exact(3).map(|p| [p[0], 0.6 * p[1], 0.3 * p[2]]).collect()).unwrap()
+}
+
+/// `factor p + offset`.
+fn placed(cloud: &PointCloud, factor: f64, offset: [f64; 3]) -> PointCloud {
+    let place = |p: &[f64; 3]| [0, 1, 2].map(|c| factor * p[c] + offset[c]);
+    PointCloud::new(cloud.points().iter().map(place).collect()).unwrap()
+}
+
+fn drawn(seed: u64) -> Rigid {
+    let mut numbers = Numbers(seed);
+    Rigid { rotation: numbers.rotation(45.0), translation: Vector3::from_vec(numbers.many(3)) }
+}
+
+/// Largest distance between the images of the points of a cloud under two poses.
+fn image_gap(cloud: &PointCloud, a: &Rigid, b: &Rigid) -> f64 {
+    let gap = |p: &[f64; 3]| (Vector3::from(a.apply(p)) - Vector3::from(b.apply(p))).norm();
+    cloud.points().iter().map(gap).fold(0.0, f64::max)
+}
+
+#[test]
+fn frames_centre_scale_and_are_undone() {
+    for (factor, offset) in [(1.0, [0.0; 3]), (37.0, UTM), (1e-4, [1.0, -2.0, 3.0])] {
+        let source = placed(&cloud(1, 61), factor, offset);
+        let pose = drawn(2);
+        let target = source.transformed(&pose);
+        let frame = PairFrame::new(&source, &target);
+
+        let mut sums = [Vector3::zeros(); 2];
+        let mut squares = 0.0;
+        for (p, q) in source.points().iter().zip(target.points()) {
+            let (p, q) = (Vector3::from(frame.source(p)), Vector3::from(frame.target(q)));
+            sums = [sums[0] + p, sums[1] + q];
+            squares += (p.norm_squared() + q.norm_squared()) / 122.0;
+        }
+        assert!(sums.iter().all(|sum| sum.norm() / 61.0 < 1e-9 / factor.min(1.0)), "{sums:?}");
+        assert!((squares.sqrt() - 0.6).abs() < 1e-6);
+
+        // The frames commute with the pose, and the conversion is undone.
+        let inside = frame.to_network(&pose);
+        for p in source.points() {
+            let one = Vector3::from(frame.target(&pose.apply(p)));
+            let other = Vector3::from(inside.apply(&frame.source(p)));
+            assert!((one - other).norm() < 1e-8 / factor.min(1.0));
+        }
+        let back = frame.from_network(&inside);
+        assert!(image_gap(&source, &back, &pose) < 1e-6 * factor.max(1e-3));
+    }
+}
+
+#[test]
+fn batches_hold_network_units_and_return_poses() {
+    let device = Device::flex();
+    let poses = [drawn(3), drawn(4), drawn(5)];
+    let sources = [placed(&cloud(6, 61), 1.0, UTM), cloud(7, 61), placed(&cloud(8, 61), 250.0, [0.0; 3])];
+    let targets: Vec<PointCloud> = sources.iter().zip(&poses).map(|(s, pose)| s.transformed(pose)).collect();
+    let pairs: Vec<(&PointCloud, &PointCloud)> = sources.iter().zip(&targets).collect();
+    let batch = PairBatch::new(&pairs, &device).unwrap();
+    assert_eq!(batch.source.dims(), [3, 61, 3]);
+    assert_eq!(batch.target.dims(), [3, 61, 3]);
+
+    // The true poses carry the source tensors onto the target tensors, and come back.
+    let (rotation, translation) = batch.truth(&poses);
+    let moved = srrf_model::transform(batch.source.clone(), rotation.clone(), translation.clone());
+    assert!(difference(&values(&moved), &values(&batch.target)) < 1e-6);
+    for ((found, pose), source) in batch.poses(&rotation, &translation).iter().zip(&poses).zip(&sources) {
+        let extent = 2.0 * source.to_unit_sphere().1.radius;
+        assert!(image_gap(source, &found.unwrap(), pose) < 1e-6 * extent, "also far from the origin");
+    }
+
+    // One pose that is not finite spoils no other.
+    let broken =
+        translation.slice_assign([1..2, 0..1], burn::tensor::Tensor::full([1, 1], f32::NAN, &device));
+    let found = batch.poses(&rotation, &broken);
+    assert_eq!(found.iter().map(Option::is_some).collect::<Vec<_>>(), [true, false, true]);
+}
+
+#[test]
+fn batches_need_equal_numbers_of_points() {
+    let device = Device::flex();
+    let (a, b) = (cloud(9, 13), cloud(10, 11));
+    assert!(PairBatch::new(&[], &device).is_none());
+    assert!(PairBatch::new(&[(&a, &b)], &device).is_none());
+    assert!(PairBatch::new(&[(&a, &a), (&b, &b)], &device).is_none());
+    // Coinciding points have no scale; they are centred and keep their own.
+    let dot = PointCloud::new(vec![[7.0; 3]; 13]).unwrap();
+    let batch = PairBatch::new(&[(&dot, &dot)], &device).unwrap();
+    assert!(values(&batch.source).iter().all(|&v| v == 0.0));
+}
+
+fn network() -> SrrfRegister {
+    let device = Device::flex();
+    let config = tiny();
+    let model = init::seeded(config.init(&device), 12);
+    let bytes = weights::to_safetensors(&model, &config, "tiny", &BTreeMap::new()).unwrap();
+    SrrfRegister::new(weights::from_safetensors(&bytes, "memory", &device).unwrap(), device)
+}
+
+fn gap_deg(a: &Registration, b: &Registration) -> f64 {
+    a.target_from_source.angle_to_deg(&b.target_from_source)
+}
+
+#[test]
+fn answers_hold_both_branches() {
+    let network = network();
+    assert_eq!(network.name(), "srrf");
+    let answer = network.register(&cloud(13, 61), &cloud(14, 67)).unwrap();
+    assert_eq!(answer.iterations, 1);
+    assert_eq!(answer.branches.iter().map(|b| b.name).collect::<Vec<_>>(), ["dense", "skeleton"]);
+    for branch in &answer.branches {
+        assert!((0.0..=1.0).contains(&branch.inlier_ratio));
+        assert!((branch.target_from_source.rotation.determinant() - 1.0).abs() < 1e-12);
+    }
+    assert!((answer.target_from_source.rotation.determinant() - 1.0).abs() < 1e-12);
+
+    // The same input gives the same answer, alone or among others.
+    let (a, b, c) = (cloud(13, 61), cloud(14, 67), cloud(15, 3));
+    let together = network.register_batch(&[(&a, &b), (&c, &a)]);
+    assert_eq!(together[0].as_ref().unwrap(), &answer);
+    assert_eq!(together[1].as_ref().unwrap(), &network.register(&c, &a).unwrap());
+    assert!(network.register_batch(&[]).is_empty());
+}
+
+#[test]
+fn unusable_clouds_are_refused_by_side() {
+    let (network, good) = (network(), cloud(16, 61));
+    let cloud = |points: Vec<[f64; 3]>| PointCloud::new(points).unwrap();
+    let line = cloud((0..31).map(|i| [f64::from(i), 2.0 * f64::from(i), -1.0]).collect());
+    let two = cloud(vec![[0.0; 3], [1.0, 0.0, 0.0]]);
+    let dot = cloud(vec![[3.0; 3]; 9]);
+    for (bad, wanted) in [
+        (&line, CloudError::Collinear),
+        (&dot, CloudError::Collinear),
+        (&two, CloudError::TooFew { have: 2, need: 3 }),
+    ] {
+        match network.register(bad, &good) {
+            Err(RegisterError::Source(found)) => assert_eq!(found, wanted),
+            other => panic!("{other:?}"),
+        }
+        match network.register(&good, bad) {
+            Err(RegisterError::Target(found)) => assert_eq!(found, wanted),
+            other => panic!("{other:?}"),
+        }
+    }
+    // One bad pair spoils no other.
+    let answers = network.register_batch(&[(&good, &line), (&good, &good)]);
+    assert!(answers[0].is_err() && answers[1].is_ok());
+    // Three points, coinciding points among others, and a plane are enough.
+    let three = cloud(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    let doubled = cloud(good.points().iter().chain(good.points()).copied().collect());
+    for (source, target) in [(&three, &three), (&three, &good), (&good, &three), (&doubled, &good)] {
+        let pose = network.register(source, target).unwrap().target_from_source;
+        assert!(pose.rotation.iter().chain(pose.translation.iter()).all(|v| v.is_finite()));
+    }
+}
+
+#[test]
+fn numbers_beyond_measure_are_an_error() {
+    let (network, good) = (network(), cloud(17, 61));
+    for factor in [1e155, 1e200, 1e300] {
+        let huge = placed(&good, factor, [0.0; 3]);
+        for (source, target) in [(&huge, &huge), (&huge, &good), (&good, &huge)] {
+            let answer = network.register(source, target);
+            assert!(matches!(answer, Err(RegisterError::NoPose(_))), "{factor:e}: {answer:?}");
+        }
+    }
+    // Large and small ones are in order.
+    for factor in [1e100, 1e-100] {
+        let cloud = placed(&good, factor, [0.0; 3]);
+        assert!(network.register(&cloud, &cloud).is_ok());
+    }
+}
+
+#[test]
+fn answers_follow_translation_scale_and_order() {
+    let network = network();
+    let (source, target) = (cloud(18, 61), cloud(19, 61));
+    let plain = network.register(&source, &target).unwrap();
+    let pose = plain.target_from_source;
+
+    // Each cloud anywhere: the rotation stays, the images move with the target. In metres at map
+    // coordinates, f64 itself rounds at 1e-9.
+    for (a, b) in [([5.0, -7.0, 0.25], [-300.0, 2.0, 1.0]), (UTM, [0.0; 3]), (UTM, UTM)] {
+        let (moved_source, moved_target) = (placed(&source, 1.0, a), placed(&target, 1.0, b));
+        let moved = network.register(&moved_source, &moved_target).unwrap();
+        assert!(gap_deg(&plain, &moved) < 0.01, "{}", gap_deg(&plain, &moved));
+        for (p, q) in source.points().iter().zip(moved_source.points()) {
+            let wanted = Vector3::from(pose.apply(p)) + Vector3::from(b);
+            assert!((Vector3::from(moved.target_from_source.apply(q)) - wanted).norm() < 1e-3);
+        }
+    }
+
+    // Another unit for both.
+    for unit in [0.3048, 1000.0, 1e-9, 1e12] {
+        let scaled =
+            network.register(&placed(&source, unit, [0.0; 3]), &placed(&target, unit, [0.0; 3])).unwrap();
+        assert!(gap_deg(&plain, &scaled) < 0.01);
+        let gap = scaled.target_from_source.translation / unit - pose.translation;
+        assert!(gap.norm() < 1e-3);
+    }
+
+    // Another order.
+    let order = Numbers(20).permutation(61);
+    let shuffled = PointCloud::new(order.iter().map(|&i| source.points()[i]).collect()).unwrap();
+    assert!(gap_deg(&plain, &network.register(&shuffled, &target).unwrap()) < 0.05);
+}
+
+#[test]
+fn more_points_than_the_network_takes_are_subsampled_and_passes_are_chained() {
+    let mut network = network();
+    let (source, target) = (cloud(21, 211), cloud(22, 97));
+    network.max_points = 61;
+    let one = network.register(&source, &target).unwrap();
+    // Even samples do not depend on the order, also far from the origin.
+    let mut turned = source.points().to_vec();
+    turned.reverse();
+    let far = placed(&PointCloud::new(turned).unwrap(), 1.0, UTM);
+    assert!(gap_deg(&one, &network.register(&far, &target).unwrap()) < 0.05);
+
+    // Two passes are one pass, and one more on the source as the first left it.
+    network.passes = 2;
+    let two = network.register(&source, &target).unwrap();
+    assert_eq!(two.iterations, 2);
+    network.passes = 1;
+    network.max_points = 1024;
+    let (source, target) = (cloud(23, 61), cloud(24, 61));
+    let first = network.register(&source, &target).unwrap().target_from_source;
+    let second = network.register(&source.transformed(&first), &target).unwrap();
+    network.passes = 2;
+    let both = network.register(&source, &target).unwrap();
+    let chained = second.target_from_source.compose(&first);
+    assert!(image_gap(&source, &both.target_from_source, &chained) < 1e-9);
+    for (branch, last) in both.branches.iter().zip(&second.branches) {
+        let chained = last.target_from_source.compose(&first);
+        assert!(image_gap(&source, &branch.target_from_source, &chained) < 1e-9);
+    }
+}
