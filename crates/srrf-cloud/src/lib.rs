@@ -22,5 +22,5 @@ pub use euler::EulerXyz;
 pub use fps::farthest_point_sampling;
 pub use neighbours::KnnIndex;
 pub use normals::estimate_normals;
-pub use register::{Branch, Register, RegisterError, Registration};
+pub use register::{Branch, Register, RegisterError, Registration, Skeletons};
 pub use rigid::Rigid;

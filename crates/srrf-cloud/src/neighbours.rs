@@ -83,6 +83,11 @@ impl KnnIndex {
             let tied = tree.query(query).within::<SquaredEuclidean<f64>>(radius).unsorted().execute();
             neighbours.clear();
             neighbours.extend(tied.iter().map(|f| self.with_distance(f.item as usize, query)));
+            // Scans may hold thousands of points at the origin: sort only what is kept.
+            if neighbours.len() > k {
+                neighbours.select_nth_unstable_by(k, by_distance);
+                neighbours.truncate(k);
+            }
             sort(&mut neighbours);
         }
         neighbours.truncate(k);
@@ -107,7 +112,11 @@ pub(crate) fn squared_distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 }
 
 fn sort(neighbours: &mut [(usize, f64)]) {
-    neighbours.sort_unstable_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+    neighbours.sort_unstable_by(by_distance);
+}
+
+fn by_distance(a: &(usize, f64), b: &(usize, f64)) -> std::cmp::Ordering {
+    a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))
 }
 
 #[cfg(test)]

@@ -27,6 +27,15 @@ pub struct Branch {
     pub inlier_ratio: f64,
 }
 
+/// Skeletons that a method extracted on its way, each in the coordinates of its cloud.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Skeletons {
+    /// Skeleton points of the source, shape `[s, 3]`.
+    pub source: Vec<[f64; 3]>,
+    /// Skeleton points of the target, shape `[s, 3]`.
+    pub target: Vec<[f64; 3]>,
+}
+
 /// What a method answers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Registration {
@@ -38,12 +47,14 @@ pub struct Registration {
     pub iterations: usize,
     /// Poses found on the way, each scored as a row of its own.
     pub branches: Vec<Branch>,
+    /// The skeletons, from methods that make them.
+    pub skeletons: Option<Skeletons>,
 }
 
 impl Registration {
     /// An answer without branches from a method that does not iterate.
     pub fn from_pose(target_from_source: Rigid) -> Self {
-        Self { target_from_source, converged: true, iterations: 1, branches: Vec::new() }
+        Self { target_from_source, converged: true, iterations: 1, branches: Vec::new(), skeletons: None }
     }
 }
 
