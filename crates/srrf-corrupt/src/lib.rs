@@ -5,6 +5,21 @@
 //! ([`srrf_cloud::PointCloud::to_unit_sphere`]). All numbers, each with its source, are in
 //! [`parameters`]; where the paper's text and the reference code differ, [`Variants`] names both
 //! and defaults to the text.
+//!
+//! ```
+//! use srrf_cloud::{shapes::ProceduralShapes, source::ShapeSource};
+//! use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream, oracle_pose};
+//!
+//! let shapes = ProceduralShapes::new(7, 3, None)?;
+//! let synthesizer = PairSynthesizer::new(PairConfig::default())?;
+//! let corruption = Some((CorruptionKind::Cutout, Severity::try_from(3)?));
+//! let pair = synthesizer.pair(&shapes, 0, corruption, PoseDraw::Seeded, Stream { seed: 1, item: 0 })?;
+//! assert_eq!((pair.source.len(), pair.target.len()), (1024, 1024));
+//! // Cutouts leave the other points exact, so that perfect correspondences give the exact pose.
+//! let oracle = oracle_pose(&pair).ok_or("nothing in common")?;
+//! assert!(oracle.angle_to_deg(&pair.target_from_source) < 1e-6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod corruption;
 pub mod corruptions;

@@ -68,6 +68,19 @@ mod tests {
     }
 
     #[test]
+    fn the_deleted_are_random_in_their_cluster() {
+        // Points in order along a line: a cluster is a run of indices, the deleted are not.
+        let line: Vec<[f64; 3]> = (0..1024).map(|i| [f64::from(i) / 1024.0, 0.0, 0.0]).collect();
+        let out = DensityDec.apply(&line, Severity::ALL[0], &mut rng(5)).unwrap();
+        let gone: Vec<u32> = (0..1024).filter(|i| !out.origin.contains(&Some(*i))).collect();
+        let (first, last) = (gone[0], gone[gone.len() - 1]);
+        assert!((80..100).contains(&(last - first)), "{gone:?}");
+        let middle = (first + last) / 2;
+        let half = gone.iter().filter(|i| **i < middle).count();
+        assert!((25..50).contains(&half), "{half}");
+    }
+
+    #[test]
     fn too_few_points_are_refused() {
         let error = DensityDec.apply(&cloud(31), Severity::ALL[4], &mut rng(5)).unwrap_err();
         assert_eq!(error, CorruptError::TooFew { corruption: "density_dec", have: 31, need: 32 });
