@@ -2,12 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Read, Seek, Write};
+use std::io::{self, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use npyz::{NpyFile, Order, TypeChar, WriteOptions, WriterBuilder};
-use zip::CompressionMethod;
-use zip::write::SimpleFileOptions;
 
 /// Why a NumPy file cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -82,7 +80,7 @@ impl Array {
     }
 
     /// Writes `values` of `shape` as one `.npy` stream of `f64`.
-    fn write(stream: impl Write, shape: &[usize], values: &[f64]) -> io::Result<()> {
+    pub(crate) fn write(stream: impl Write, shape: &[usize], values: &[f64]) -> io::Result<()> {
         let shape: Vec<u64> = shape.iter().map(|&d| d as u64).collect();
         let mut writer =
             WriteOptions::<f64>::new().default_dtype().shape(&shape).writer(stream).begin_nd()?;
@@ -172,40 +170,6 @@ pub(crate) fn npy_bytes(shape: &[usize], values: &[f64]) -> io::Result<Vec<u8>> 
     Ok(bytes)
 }
 
-/// Writes a `.npz` file array by array; the same arrays give the same bytes.
-pub struct NpzWriter<W: Write + Seek> {
-    zip: zip::ZipWriter<W>,
-}
-
-impl<W: Write + Seek> NpzWriter<W> {
-    /// Starts an archive.
-    pub fn new(stream: W) -> Self {
-        Self { zip: zip::ZipWriter::new(stream) }
-    }
-
-    /// Adds an array of `f64`, uncompressed as `numpy.savez` does.
-    ///
-    /// # Errors
-    /// Those of the stream.
-    pub fn array(&mut self, name: &str, shape: &[usize], values: &[f64]) -> io::Result<()> {
-        let options = SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Stored)
-            .large_file(values.len() > (u32::MAX / 16) as usize);
-        self.zip.start_file(format!("{name}.npy"), options)?;
-        let mut buffered = BufWriter::new(&mut self.zip);
-        Array::write(&mut buffered, shape, values)?;
-        buffered.flush()
-    }
-
-    /// Ends the archive.
-    ///
-    /// # Errors
-    /// Those of the stream.
-    pub fn finish(self) -> io::Result<W> {
-        Ok(self.zip.finish()?)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -258,23 +222,5 @@ mod tests {
     fn header(descr: &str, shape: &str) -> Vec<u8> {
         let text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
         [b"\x93NUMPY\x01\x00", &(text.len() as u16).to_le_bytes()[..], text.as_bytes()].concat()
-    }
-
-    #[test]
-    fn archives_have_stable_bytes() {
-        let write = || {
-            let mut npz = NpzWriter::new(io::Cursor::new(Vec::new()));
-            npz.array("a_x", &[1, 2, 3], &[1.0; 6]).unwrap();
-            npz.array("a_t", &[1, 3], &[2.0; 3]).unwrap();
-            npz.finish().unwrap().into_inner()
-        };
-        assert_eq!(write(), write());
-        let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(file.path(), write()).unwrap();
-        let npz = read_npz(file.path()).unwrap();
-        assert_eq!(npz.names, ["a_x", "a_t"]);
-        assert_eq!(npz.arrays["a_x"].shape, [1, 2, 3]);
-        std::fs::write(file.path(), "text").unwrap();
-        assert!(read_npz(file.path()).unwrap_err().to_string().contains("not an .npz archive"));
     }
 }

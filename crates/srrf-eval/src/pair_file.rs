@@ -22,7 +22,8 @@ use nalgebra::{Matrix3, Vector3};
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::Pair;
 
-use crate::arrays::{self, Array, ArrayError, Npz, NpzWriter};
+use crate::arrays::{self, Array, ArrayError, Npz};
+use crate::npz_writer::NpzWriter;
 use crate::pairs::{EvalPair, Group, PairSource};
 use crate::{EvalError, output};
 

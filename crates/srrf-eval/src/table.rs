@@ -168,9 +168,12 @@ fn aligned(lines: &[Vec<String>]) -> String {
     text
 }
 
+/// How to read a value from [`Scores`].
+type Value = fn(&Scores) -> Option<f64>;
+
 /// `table.csv`: one line for each row of the summary; fields that do not apply are empty.
 pub(crate) fn csv(summary: &Summary) -> String {
-    let fields: [(&str, fn(&Scores) -> Option<f64>); 14] = [
+    let fields: [(&str, Value); 14] = [
         ("mse_r", |s| Some(s.mse_r)),
         ("rmse_r", |s| Some(s.rmse_r)),
         ("mae_r", |s| Some(s.mae_r)),

@@ -119,11 +119,14 @@ fn split(all: Poses, groups: &[Group]) -> Result<Vec<Poses>, String> {
     Ok(groups.iter().map(|g| rest.by_ref().take(g.pairs).collect()).collect())
 }
 
+/// Nested rows; `null` is how JSON writes NaN.
+type JsonMatrix = Vec<Vec<Option<f64>>>;
+
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Json {
-    Groups(BTreeMap<String, Vec<Option<Vec<Vec<Option<f64>>>>>>),
-    All(Vec<Option<Vec<Vec<Option<f64>>>>>),
+    Groups(BTreeMap<String, Vec<Option<JsonMatrix>>>),
+    All(Vec<Option<JsonMatrix>>),
 }
 
 fn from_json(text: &str, groups: &[Group]) -> Result<Vec<Poses>, String> {
@@ -132,7 +135,7 @@ fn from_json(text: &str, groups: &[Group]) -> Result<Vec<Poses>, String> {
          3 x 4 as nested rows, or null"
             .to_owned()
     })?;
-    let read = |list: Vec<Option<Vec<Vec<Option<f64>>>>>| -> Result<Poses, String> {
+    let read = |list: Vec<Option<JsonMatrix>>| -> Result<Poses, String> {
         list.into_iter()
             .enumerate()
             .map(|(pair, matrix)| {
@@ -185,7 +188,7 @@ mod tests {
     use srrf_cloud::EulerXyz;
 
     use super::*;
-    use crate::arrays::NpzWriter;
+    use crate::npz_writer::NpzWriter;
 
     fn groups() -> Vec<Group> {
         let group =

@@ -1,5 +1,6 @@
 //! Runs the program as a user does.
 #![allow(dead_code, reason = "each test file uses a part")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
 
 use std::path::Path;
 use std::process::{Command, Output};
