@@ -77,7 +77,7 @@ pub(super) fn table(s: &mut Sketch) {
     }
     for _ in 0..s.count(1, 3) {
         let at = [s.between(-0.7, 0.7) * half[0], s.between(-0.6, 0.6) * half[1], height + top - 0.02];
-        let size = s.between(0.12, 0.3);
+        let size = s.between(0.2, 0.45);
         trinket(s, at, size);
     }
 }
@@ -219,13 +219,13 @@ pub(super) fn cabinet(s: &mut Sketch) {
         if height > 1.3 { (s.count(1, 2), s.count(1, 3)) } else { (s.count(1, 4), s.count(1, 2)) };
     chest(s, [0.0, 0.0, foot], [width, depth, height], rows, columns);
     s.cuboid([0.0, 0.0, foot + height], [1.06 * width, 1.06 * depth, 0.05]);
-    if s.chance(0.4) {
-        let drawer = s.between(0.15, 0.5) * depth;
+    if s.chance(0.65) {
+        let drawer = s.between(0.3, 0.7) * depth;
         let x = s.side() * 0.25 * width;
         let z = foot + height * s.between(0.3, 0.8);
         s.cuboid([x, -0.5 * (depth + drawer), z], [0.42 * width, drawer + 0.02, 0.12]); // an open drawer
     }
-    for _ in 0..s.count(0, 2) {
+    for _ in 0..s.count(1, 3) {
         let at = [s.between(-0.4, 0.4) * width, s.between(-0.2, 0.2) * depth, foot + height + 0.02];
         let size = s.between(0.15, 0.3);
         trinket(s, at, size);
