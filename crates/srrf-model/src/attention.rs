@@ -36,7 +36,8 @@ impl MultiHeadAttention {
 
         let q = self.query.forward(queries) / (per_head as f64).sqrt();
         let q = q.reshape([clouds, n, self.heads, per_head]).swap_dims(1, 2); // [clouds, heads, n, d]
-        let kv = self.key_value.forward(memory).reshape([clouds, m, 2 * self.heads, per_head]).swap_dims(1, 2);
+        let kv =
+            self.key_value.forward(memory).reshape([clouds, m, 2 * self.heads, per_head]).swap_dims(1, 2);
         let k = kv.clone().narrow(1, 0, self.heads); // [clouds, heads, m, d]
         let v = kv.narrow(1, self.heads, self.heads);
 

@@ -22,7 +22,8 @@ impl PairFrame {
     pub fn new(source: &PointCloud, target: &PointCloud) -> Self {
         let (source_mean, target_mean) = (source.centroid(), target.centroid());
         let mean_square = |cloud: &PointCloud, mean: Vector3<f64>| {
-            cloud.points().iter().map(|p| (Vector3::from(*p) - mean).norm_squared()).sum::<f64>() / cloud.len() as f64
+            cloud.points().iter().map(|p| (Vector3::from(*p) - mean).norm_squared()).sum::<f64>()
+                / cloud.len() as f64
         };
         let rms = ((mean_square(source, source_mean) + mean_square(target, target_mean)) / 2.0).sqrt();
         let scale = if rms > 0.0 { rms / NETWORK_RMS } else { 1.0 };
@@ -37,6 +38,16 @@ impl PairFrame {
     /// Target coordinates in network units.
     pub fn target(&self, point: &[f64; 3]) -> [f64; 3] {
         ((Vector3::from(*point) - self.target_mean) / self.scale).into()
+    }
+
+    /// A point of the source in network units, back in source coordinates.
+    pub fn undo_source(&self, point: &[f64; 3]) -> [f64; 3] {
+        (Vector3::from(*point) * self.scale + self.source_mean).into()
+    }
+
+    /// A point of the target in network units, back in target coordinates.
+    pub fn undo_target(&self, point: &[f64; 3]) -> [f64; 3] {
+        (Vector3::from(*point) * self.scale + self.target_mean).into()
     }
 
     /// A pose between the given clouds as the network sees it.
@@ -72,7 +83,8 @@ impl PairBatch {
         if pairs.iter().any(|(source, target)| source.len() != points || target.len() != points) {
             return None;
         }
-        let frames: Vec<PairFrame> = pairs.iter().map(|(source, target)| PairFrame::new(source, target)).collect();
+        let frames: Vec<PairFrame> =
+            pairs.iter().map(|(source, target)| PairFrame::new(source, target)).collect();
         let shape = [pairs.len(), points, 3];
         let tensor = |values: Vec<f32>| Tensor::<3>::from_data(TensorData::new(values, shape), device);
         let mut source = Vec::with_capacity(shape.iter().product());

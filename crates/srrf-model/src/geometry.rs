@@ -195,7 +195,12 @@ mod tests {
     use super::*;
 
     fn cloud(n: usize) -> Vec<[f32; 3]> {
-        (0..n).map(|i| { let s = i as f32; [(s * 1.3).sin(), (s * 0.7).cos(), (s * s * 0.11).sin()] }).collect()
+        (0..n)
+            .map(|i| {
+                let s = i as f32;
+                [(s * 1.3).sin(), (s * 0.7).cos(), (s * s * 0.11).sin()]
+            })
+            .collect()
     }
 
     #[test]
@@ -204,7 +209,9 @@ mod tests {
         let found = k_nearest(&queries, &support, 5);
         for (q, row) in queries.iter().zip(found.chunks(5)) {
             let mut order: Vec<u32> = (0..57).collect();
-            order.sort_by(|a, b| squared(q, &support[*a as usize]).total_cmp(&squared(q, &support[*b as usize])));
+            order.sort_by(|a, b| {
+                squared(q, &support[*a as usize]).total_cmp(&squared(q, &support[*b as usize]))
+            });
             assert_eq!(row, &order[..5]);
         }
         let first: Vec<u32> = found.chunks(5).map(|row| row[0]).collect();

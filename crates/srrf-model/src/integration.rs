@@ -89,10 +89,8 @@ impl IntegrationConfig {
         let blend = |a: Tensor<2>, b: Tensor<2>| a * weight.clone() + b * (-weight.clone() + 1.0);
 
         let batch = lambda.len();
-        let rotation = blend(
-            dense.rotation.clone().reshape([batch, 9]),
-            skeleton.rotation.clone().reshape([batch, 9]),
-        );
+        let rotation =
+            blend(dense.rotation.clone().reshape([batch, 9]), skeleton.rotation.clone().reshape([batch, 9]));
         // The projection is the exact weighted chordal mean of the two rotations.
         let rotation = nearest_rotation(rotation.reshape([batch, 3, 3]));
         let translation = blend(dense.translation.clone(), skeleton.translation.clone());
@@ -110,12 +108,14 @@ impl IntegrationConfig {
         let (rotation, translation) = (branch.rotation.clone().detach(), branch.translation.clone().detach());
         match self.test {
             InlierTest::SoftMatch => {
-                let moved = HostClouds::read(&transform(branch.points.clone().detach(), rotation, translation));
+                let moved =
+                    HostClouds::read(&transform(branch.points.clone().detach(), rotation, translation));
                 let matches = HostClouds::read(&branch.matches.clone().detach());
                 let near = |a: &[f32; 3], b: &[f32; 3]| {
                     (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>() < threshold * threshold
                 };
-                let count = |a: &[[f32; 3]], b: &[[f32; 3]]| a.iter().zip(b).filter(|(a, b)| near(a, b)).count();
+                let count =
+                    |a: &[[f32; 3]], b: &[[f32; 3]]| a.iter().zip(b).filter(|(a, b)| near(a, b)).count();
                 moved.iter().zip(matches.iter()).map(|(a, b)| count(a, b) as f64 / a.len() as f64).collect()
             }
             InlierTest::Nearest => {

@@ -19,7 +19,8 @@ pub fn registration_loss(
 ) -> Tensor<1> {
     let identity: Vec<f64> = (0..9).map(|i| if i % 4 == 0 { 1.0 } else { 0.0 }).collect();
     let device = true_rotation.device().without_autodiff();
-    let identity = Tensor::<3>::from_data(TensorData::new(identity, [1, 3, 3]), (&device, true_rotation.dtype()));
+    let identity =
+        Tensor::<3>::from_data(TensorData::new(identity, [1, 3, 3]), (&device, true_rotation.dtype()));
     let difference = rotation.transpose().matmul(true_rotation) - identity;
     difference.square().mean() + (translation - true_translation).square().mean()
 }

@@ -1,8 +1,8 @@
 //! [`SrrfRegister`]: the network behind the [`Register`] seam.
 
 use burn::module::Module;
-use burn::tensor::Device;
-use srrf_cloud::{Branch, PointCloud, Register, RegisterError, Registration, Rigid};
+use burn::tensor::{Device, Tensor};
+use srrf_cloud::{Branch, PointCloud, Register, RegisterError, Registration, Rigid, Skeletons};
 
 use crate::batch::PairBatch;
 use crate::geometry::even_subsample;
@@ -45,6 +45,8 @@ impl SrrfRegister {
         let fused = batch.poses(&output.fused.rotation, &output.fused.translation);
         let dense = batch.poses(&output.dense.rotation, &output.dense.translation);
         let skeleton = batch.poses(&output.skeleton.rotation, &output.skeleton.translation);
+        let source_skeletons = cloud_points(&output.source_skeleton.points);
+        let target_skeletons = cloud_points(&output.target_skeleton.points);
         (0..pairs.len())
             .map(|i| {
                 let branch = |name, pose: &[Option<Rigid>], ratio: &[f64]| {
@@ -54,7 +56,16 @@ impl SrrfRegister {
                     branch("dense", &dense, &output.fused.dense_inlier_ratio)?,
                     branch("skeleton", &skeleton, &output.fused.skeleton_inlier_ratio)?,
                 ];
-                Some(Registration { branches, ..Registration::from_pose(fused[i]?) })
+                let frame = &batch.frames[i];
+                let skeletons = Skeletons {
+                    source: source_skeletons[i].iter().map(|p| frame.undo_source(p)).collect(),
+                    target: target_skeletons[i].iter().map(|p| frame.undo_target(p)).collect(),
+                };
+                Some(Registration {
+                    branches,
+                    skeletons: Some(skeletons),
+                    ..Registration::from_pose(fused[i]?)
+                })
             })
             .collect()
     }
@@ -70,7 +81,10 @@ impl Register for SrrfRegister {
         answers.pop().unwrap_or_else(|| Err(RegisterError::NoPose("the batch was empty".into())))
     }
 
-    fn register_batch(&self, pairs: &[(&PointCloud, &PointCloud)]) -> Vec<Result<Registration, RegisterError>> {
+    fn register_batch(
+        &self,
+        pairs: &[(&PointCloud, &PointCloud)],
+    ) -> Vec<Result<Registration, RegisterError>> {
         pairs.iter().map(|pair| self.register_one(pair.0, pair.1)).collect()
     }
 }
@@ -87,17 +101,31 @@ impl SrrfRegister {
             let moved = source.transformed(&start);
             let answer = self.pass(&[(&moved, &target)]).pop().flatten();
             let mut answer = answer.ok_or_else(|| {
-                RegisterError::NoPose("the network's output is not finite; are the coordinates extreme?".into())
+                RegisterError::NoPose(
+                    "the network's output is not finite; are the coordinates extreme?".into(),
+                )
             })?;
             answer.target_from_source = answer.target_from_source.compose(&start);
             for branch in &mut answer.branches {
                 branch.target_from_source = branch.target_from_source.compose(&start);
+            }
+            if let Some(skeletons) = &mut answer.skeletons {
+                let back = start.inverse();
+                skeletons.source.iter_mut().for_each(|p| *p = back.apply(p));
             }
             answer.iterations = found.as_ref().map_or(1, |r| r.iterations + 1);
             found = Some(answer);
         }
         found.ok_or_else(|| RegisterError::NoPose("no pass was made".into()))
     }
+}
+
+/// Points of each cloud of a batch, `[batch, points, 3]`, in `f64`.
+fn cloud_points(points: &Tensor<3>) -> Vec<Vec<[f64; 3]>> {
+    let [_, n, _] = points.dims();
+    let flat = points.try_to_vec_as::<f64>().unwrap_or_default();
+    let points: Vec<[f64; 3]> = flat.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+    points.chunks(n.max(1)).map(<[_]>::to_vec).collect()
 }
 
 /// `points` points of the cloud, evenly along a space-filling curve.
@@ -109,5 +137,6 @@ fn subsample(cloud: &PointCloud, points: usize) -> Result<PointCloud, RegisterEr
     let (unit, _) = cloud.to_unit_sphere();
     let unit: Vec<[f32; 3]> = unit.points().iter().map(|p| p.map(|v| v as f32)).collect();
     let chosen = even_subsample(&unit, points, PHASE);
-    PointCloud::new(chosen.into_iter().map(|i| cloud.points()[i as usize]).collect()).map_err(RegisterError::Source)
+    PointCloud::new(chosen.into_iter().map(|i| cloud.points()[i as usize]).collect())
+        .map_err(RegisterError::Source)
 }

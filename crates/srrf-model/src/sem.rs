@@ -157,8 +157,9 @@ impl Sem {
                 (xyz.clone(), host.clone())
             };
             let supports: Vec<_> = host.iter().collect();
-            let neighbours =
-                flat_indices(host_centres.iter(), n, |i, centre| k_nearest(centre, supports[i], level.neighbours));
+            let neighbours = flat_indices(host_centres.iter(), n, |i, centre| {
+                k_nearest(centre, supports[i], level.neighbours)
+            });
             let grouped = level.group(xyz, features, centres.clone(), &neighbours);
             (xyz, features, host, n) = (centres, Some(grouped), host_centres, samples);
         }

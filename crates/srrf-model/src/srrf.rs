@@ -76,7 +76,8 @@ impl Srrf {
         let source_skeleton = self.sem.forward(source.clone());
         let target_skeleton = self.sem.forward(target.clone());
         // The gradient stop between SEM and registration.
-        let (source_stopped, target_stopped) = (source_skeleton.detached_points(), target_skeleton.detached_points());
+        let (source_stopped, target_stopped) =
+            (source_skeleton.detached_points(), target_skeleton.detached_points());
         // (2, 3) Features, interaction, matching and SVD: {R_s, t_s} and {R_c, t_c}.
         let skeleton = self.skeleton.forward(source_stopped, target_stopped, phase);
         let dense = self.dense.forward(source.clone(), target.clone(), phase);

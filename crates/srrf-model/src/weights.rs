@@ -39,7 +39,9 @@ pub enum WeightsError {
         source: safetensors::SafeTensorError,
     },
     /// The header does not describe a network of this program.
-    #[error("{origin}: no network description under `srrf_config` in the header: {why}; was it written by srrf-train?")]
+    #[error(
+        "{origin}: no network description under `srrf_config` in the header: {why}; was it written by srrf-train?"
+    )]
     Header {
         /// Where the bytes came from.
         origin: String,
@@ -184,7 +186,8 @@ pub fn to_safetensors(
     let mut header: HashMap<String, String> = notes.iter().map(|(k, v)| (k.clone(), v.clone())).collect();
     header.insert(CONFIG_KEY.into(), config);
     header.insert(NAME_KEY.into(), name.into());
-    safetensors::serialize(views, Some(header)).map_err(|source| WeightsError::Format { origin: origin(), source })
+    safetensors::serialize(views, Some(header))
+        .map_err(|source| WeightsError::Format { origin: origin(), source })
 }
 
 /// Reads a network from the bytes of a safetensors file; `origin` names them in errors.
@@ -234,16 +237,11 @@ pub fn load(path: &Path, device: &Device) -> Result<LoadedModel, WeightsError> {
     from_safetensors(&bytes, &path.display().to_string(), device)
 }
 
-/// Writes `bytes` to `path` by way of a temporary file in the same folder.
+/// Writes `bytes` to `path`, whole or not at all.
 ///
 /// # Errors
 /// [`WeightsError::Io`]; the old file, if any, is then unharmed.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), WeightsError> {
-    let failed = |source| WeightsError::Io { path: path.into(), source };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-    std::io::Write::write_all(&mut file, bytes).map_err(failed)?;
-    file.as_file().sync_all().map_err(failed)?;
-    file.persist(path).map_err(|e| failed(e.error))?;
-    Ok(())
+    srrf_cloud::io::write_atomically(path, |out| out.write_all(bytes))
+        .map_err(|source| WeightsError::Io { path: path.into(), source })
 }

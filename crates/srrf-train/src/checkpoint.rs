@@ -41,7 +41,9 @@ pub enum CheckpointError {
         why: String,
     },
     /// The checkpoint belongs to another configuration.
-    #[error("{path}: made by another configuration ({why}); use another --run folder, or remove it to start over")]
+    #[error(
+        "{path}: made by another configuration ({why}); use another --run folder, or remove it to start over"
+    )]
     OtherConfig {
         /// The file.
         path: PathBuf,
@@ -91,7 +93,9 @@ pub fn save(
     tensors.push(("optimizer".into(), Dtype::U8, vec![state.len()], state.to_vec()));
     let views = tensors
         .iter()
-        .map(|(name, dtype, shape, bytes)| Ok((name.as_str(), TensorView::new(*dtype, shape.clone(), bytes)?)))
+        .map(|(name, dtype, shape, bytes)| {
+            Ok((name.as_str(), TensorView::new(*dtype, shape.clone(), bytes)?))
+        })
         .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()
         .map_err(|e| broken(e.to_string()))?;
     let json = |value: Result<String, serde_json::Error>| value.map_err(|e| broken(e.to_string()));
@@ -125,7 +129,8 @@ pub fn load(
     let header = header.metadata().clone().unwrap_or_default();
     let entry = |key: &str| header.get(key).ok_or_else(|| broken(format!("no `{key}` in its header")));
     let progress: Progress = serde_json::from_str(entry("progress")?).map_err(|e| broken(e.to_string()))?;
-    let saved: serde_json::Value = serde_json::from_str(entry("config")?).map_err(|e| broken(e.to_string()))?;
+    let saved: serde_json::Value =
+        serde_json::from_str(entry("config")?).map_err(|e| broken(e.to_string()))?;
     let wanted = serde_json::to_value(config).map_err(|e| broken(e.to_string()))?;
     if let Some(key) = first_difference(&saved, &wanted, String::new()) {
         return Err(CheckpointError::OtherConfig { path, why: format!("`{key}` differs") });
@@ -135,7 +140,8 @@ pub fn load(
     let mut state = None;
     for (name, view) in SafeTensors::deserialize(&bytes).map_err(|e| broken(e.to_string()))?.tensors() {
         if let Some(name) = name.strip_prefix("model.") {
-            let data = view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+            let data =
+                view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
             values.insert(name.to_string(), (view.shape().to_vec(), data));
         } else if name == "optimizer" {
             state = Some(Bytes::from_bytes_vec(view.data().to_vec()));

@@ -245,7 +245,8 @@ impl TrainConfig {
     /// # Errors
     /// [`ConfigError`], which names the file and the key.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read { path: path.into(), source })?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Read { path: path.into(), source })?;
         let config: Self = toml::from_str(&text)
             .map_err(|source| ConfigError::Parse { path: path.into(), source: Box::new(source) })?;
         match config.wrong_value() {
@@ -300,7 +301,10 @@ impl TrainConfig {
                 return wrong(&key("learning_rate"), "must be more than 0");
             }
             if stage.sem == SemTraining::Frozen && !stage.registration {
-                return wrong(&key("registration"), "must be true where sem is frozen, or the stage trains nothing");
+                return wrong(
+                    &key("registration"),
+                    "must be true where sem is frozen, or the stage trains nothing",
+                );
             }
         }
         self.wrong_size()
@@ -318,15 +322,23 @@ impl TrainConfig {
                 return Some((format!("network.{name}.sfe"), "needs 1 layer and 1 neighbour or more".into()));
             }
             if branch.pfi.heads == 0 || width % branch.pfi.heads != 0 {
-                return Some((format!("network.{name}.pfi.heads"), format!("must divide {width}, layers * width")));
+                return Some((
+                    format!("network.{name}.pfi.heads"),
+                    format!("must divide {width}, layers * width"),
+                ));
             }
             if branch.pfi.squeeze == 0 {
                 return Some((format!("network.{name}.pfi.squeeze"), "must be 1 or more".into()));
             }
         }
         let sem = &network.sem;
-        if sem.levels.is_empty() || sem.levels.iter().any(|l| l.points == 0 || l.neighbours == 0 || l.widths.is_empty()) {
-            return Some(("network.sem.levels".into(), "needs a level, each with points, neighbours and widths".into()));
+        if sem.levels.is_empty()
+            || sem.levels.iter().any(|l| l.points == 0 || l.neighbours == 0 || l.widths.is_empty())
+        {
+            return Some((
+                "network.sem.levels".into(),
+                "needs a level, each with points, neighbours and widths".into(),
+            ));
         }
         (sem.skeleton_points < 3).then(|| ("network.sem.skeleton_points".into(), "must be 3 or more".into()))
     }

@@ -8,7 +8,8 @@ use rand_distr::StandardNormal;
 use srrf_cloud::source::{ShapeSource, SourceError};
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::{
-    CorruptionKind, Pair, PairConfig, PairError, PairSynthesizer, PoseDraw, Sampling, Severity, Stream as PairStream,
+    CorruptionKind, Pair, PairConfig, PairError, PairSynthesizer, PoseDraw, Sampling, Severity,
+    Stream as PairStream,
 };
 
 use crate::config::{DrawConfig, TrainConfig};
@@ -83,7 +84,8 @@ impl PairSource {
     /// # Errors
     /// [`PairError`] when a shape cannot be read or corrupted.
     pub fn shard(&self, first: usize, count: usize) -> Result<Vec<Pair>, PairError> {
-        let independent = generator(self.seed, Stream::Shard, first as u64).random_bool(self.draw.independent);
+        let independent =
+            generator(self.seed, Stream::Shard, first as u64).random_bool(self.draw.independent);
         let mut order = (usize::MAX, Vec::new());
         (first..first + count)
             .map(|number| {
@@ -180,12 +182,7 @@ impl ShapeSource for Turned<'_> {
         self.shapes.class(index)
     }
 
-    fn sample(
-        &self,
-        index: usize,
-        count: usize,
-        rng: &mut ChaCha8Rng,
-    ) -> Result<PointCloud, SourceError> {
+    fn sample(&self, index: usize, count: usize, rng: &mut ChaCha8Rng) -> Result<PointCloud, SourceError> {
         Ok(self.shapes.sample(index, count, rng)?.transformed(&self.rotation))
     }
 

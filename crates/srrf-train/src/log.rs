@@ -36,11 +36,9 @@ impl Log {
                 .collect(),
             Err(_) => Vec::new(),
         };
-        let mut file = tempfile::NamedTempFile::new_in(folder)?;
-        for line in kept {
-            writeln!(file, "{line}")?;
-        }
-        file.persist(&path)?;
+        srrf_cloud::io::write_atomically(&path, |out| {
+            kept.iter().try_for_each(|line| writeln!(out, "{line}"))
+        })?;
         let file = std::fs::OpenOptions::new().append(true).open(&path)?;
         Ok(Self { path, file })
     }
@@ -49,7 +47,14 @@ impl Log {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn train(&mut self, step: usize, epoch: f64, stage: &str, rate: f64, losses: &Losses) -> std::io::Result<()> {
+    pub fn train(
+        &mut self,
+        step: usize,
+        epoch: f64,
+        stage: &str,
+        rate: f64,
+        losses: &Losses,
+    ) -> std::io::Result<()> {
         let line = json!({ "kind": "train", "step": step, "epoch": round(epoch), "stage": stage,
             "learning_rate": rate, "losses": losses });
         writeln!(self.file, "{line}")
@@ -64,8 +69,11 @@ impl Log {
             .scores
             .iter()
             .map(|(name, s)| {
-                (name, json!({ "rmse_r": s.rmse_r, "mae_r": s.mae_r, "median_rot_deg": s.median_rot_deg,
-                    "rmse_t": s.rmse_t, "mae_t": s.mae_t, "recall": s.recall, "pairs": s.pairs }))
+                (
+                    name,
+                    json!({ "rmse_r": s.rmse_r, "mae_r": s.mae_r, "median_rot_deg": s.median_rot_deg,
+                    "rmse_t": s.rmse_t, "mae_t": s.mae_t, "recall": s.recall, "pairs": s.pairs }),
+                )
             })
             .collect();
         let line = json!({ "kind": "validation", "step": step, "epoch": round(epoch), "scores": rows,
@@ -88,7 +96,8 @@ impl Log {
         let validation =
             [("dense", score("dense")), ("skeleton", score("skeleton")), ("fused", score("fused"))];
         let loss = |name: &'static str| curve("train", &move |l| l["losses"][name].as_f64());
-        let losses = ["sem", "chamfer", "dense_correspondence", "skeleton_correspondence"].map(|n| (n, loss(n)));
+        let losses =
+            ["sem", "chamfer", "dense_correspondence", "skeleton_correspondence"].map(|n| (n, loss(n)));
 
         let picture = self.path.with_file_name("curve.svg");
         let root = SVGBackend::new(&picture, (900, 640)).into_drawing_area();

@@ -6,12 +6,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use burn::tensor::Device;
 use clap::Parser;
 use srrf_cloud::shapes::ProceduralShapes;
 use srrf_cloud::source::{ACCEPTED_LAYOUTS, ShapeSource, Split, open};
+use srrf_model::keep_freed_memory;
 use srrf_train::config::{DataSource, TrainConfig};
-use srrf_train::resources::keep_freed_memory;
 use srrf_train::run::{Existing, RunError, RunOptions, run};
 
 /// Trains the SRRF network.
@@ -84,6 +83,7 @@ fn train(arguments: Arguments) -> Result<ExitCode, Failure> {
         },
         until_step: arguments.until_step,
         time_limit: arguments.minutes.map(|m| Duration::from_secs_f64(m.max(0.0) * 60.0)),
+        say: tell,
     };
     let stop = Arc::new(AtomicBool::new(false));
     let asked = stop.clone();
@@ -91,7 +91,12 @@ fn train(arguments: Arguments) -> Result<ExitCode, Failure> {
         .map_err(|e| Failure(1, format!("no handler for Ctrl-C: {e}")))?;
 
     tell(&format!("config {}, data {}", arguments.config.display(), shapes.description()));
-    tell(&format!("run {}, device {}, {} threads", options.folder.display(), arguments.device, options.threads));
+    tell(&format!(
+        "run {}, device {}, {} threads",
+        options.folder.display(),
+        arguments.device,
+        options.threads
+    ));
     let ended = run(&config, &options, shapes, device, &stop).map_err(|e| {
         let code = if matches!(e, RunError::Exists { .. } | RunError::Checkpoint(_)) { 2 } else { 1 };
         Failure(code, e.to_string())

@@ -25,6 +25,8 @@ use crate::validate::{ValidateError, Validation, validate};
 
 /// Steps between two lines of the log.
 const LOG_EVERY: usize = 10;
+/// Steps between two lines where there is no terminal.
+const SAY_EVERY: usize = 500;
 /// The run stops when this many steps in a row are not finite.
 const MOST_SKIPPED_IN_A_ROW: usize = 20;
 
@@ -62,7 +64,9 @@ pub enum RunError {
     )]
     NotFinite(usize),
     /// There is a checkpoint, and no word on what to do with it.
-    #[error("{path} holds a run that stands at step {step}; add --resume to go on, or --restart to start over")]
+    #[error(
+        "{path} holds a run that stands at step {step}; add --resume to go on, or --restart to start over"
+    )]
     Exists {
         /// The folder.
         path: PathBuf,
@@ -94,6 +98,8 @@ pub struct RunOptions {
     pub until_step: Option<usize>,
     /// Stop after this time.
     pub time_limit: Option<Duration>,
+    /// Where lines about the run go when there is no terminal for the progress bar.
+    pub say: fn(&str),
 }
 
 /// How a call ended.
@@ -166,13 +172,20 @@ pub fn run(
         merge(&mut window, losses);
         if (step + 1).is_multiple_of(LOG_EVERY) {
             let losses = mean(&mut window);
-            bar.set_message(message(&stage.name, epoch, rate, &losses, config.optimizer.batch, &bar));
+            let line = message(&stage.name, epoch, rate, &losses, config.optimizer.batch, &bar);
+            if bar.is_hidden() && (step + 1).is_multiple_of(SAY_EVERY) {
+                (options.say)(&format!("step {} of {}  {line}", step + 1, run.plan.steps()));
+            }
+            bar.set_message(line);
             run.log.train(step + 1, epoch, &stage.name, rate, &losses).map_err(|e| run.io(e))?;
         }
         let last = step + 1 == run.plan.steps();
-        if stage.registration && ((step + 1).is_multiple_of(run.plan.steps_in(config.keep.validate_epochs)) || last) {
+        if stage.registration
+            && ((step + 1).is_multiple_of(run.plan.steps_in(config.keep.validate_epochs)) || last)
+        {
             let result = run.validate()?;
-            bar.println(summary(step + 1, epoch, &result));
+            let line = summary(step + 1, epoch, &result);
+            if bar.is_hidden() { (options.say)(&line) } else { bar.println(line) }
         }
         bar.set_position(run.progress.step as u64);
         let epochs = config.keep.checkpoint_epochs;
@@ -227,7 +240,20 @@ impl<'a> Run<'a> {
         let log = Log::open(folder, progress.step).map_err(|e| io(folder, e))?;
         let workers = Workers::new(options.threads)?;
         let started = (Instant::now(), progress.wall_seconds, cpu_seconds(), progress.cpu_seconds);
-        Ok(Self { config, options, device, pairs, held_out, workers, plan, model, optimizer, progress, log, started })
+        Ok(Self {
+            config,
+            options,
+            device,
+            pairs,
+            held_out,
+            workers,
+            plan,
+            model,
+            optimizer,
+            progress,
+            log,
+            started,
+        })
     }
 
     fn out_of_time(&self) -> bool {
@@ -302,7 +328,8 @@ impl<'a> Run<'a> {
             ("version".to_string(), env!("CARGO_PKG_VERSION").to_string()),
         ]);
         for (name, s) in validation.iter().flat_map(|v| &v.scores) {
-            let text = format!("RMSE(R) {:.3}, MAE(R) {:.3}, median {:.3} deg", s.rmse_r, s.mae_r, s.median_rot_deg);
+            let text =
+                format!("RMSE(R) {:.3}, MAE(R) {:.3}, median {:.3} deg", s.rmse_r, s.mae_r, s.median_rot_deg);
             notes.insert(format!("validation_{name}"), text);
         }
         let bytes = to_safetensors(&self.model, &self.config.network, &self.config.name, &notes)?;

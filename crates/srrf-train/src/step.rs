@@ -13,8 +13,8 @@ use rand::{RngExt, SeedableRng};
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::Pair;
 use srrf_model::{
-    BranchOutput, IntegrationConfig, PairBatch, Skeleton, Srrf, chamfer, correspondence_loss, registration_loss,
-    skeleton_loss, spread,
+    BranchOutput, IntegrationConfig, PairBatch, Skeleton, Srrf, chamfer, correspondence_loss,
+    registration_loss, skeleton_loss, spread,
 };
 
 use crate::config::{LossConfig, SemTraining, StageConfig};
@@ -107,12 +107,22 @@ impl Workers {
 ///
 /// # Errors
 /// [`StepError`] when a pair cannot be made.
-pub fn gradient(context: &StepContext, model: &Srrf, step: usize, workers: &Workers) -> Result<StepOutcome, StepError> {
+pub fn gradient(
+    context: &StepContext,
+    model: &Srrf,
+    step: usize,
+    workers: &Workers,
+) -> Result<StepOutcome, StepError> {
     let shards = context.batch / context.shard;
     let run = |i: usize| shard(context, model, step * context.batch + i * context.shard);
     let parts = workers.map(shards, run).ok_or(StepError::Worker)?;
 
-    let mut sum = SumVisitor { parts: Vec::new(), sum: GradientsParams::new(), squares: 0.0, scale: 1.0 / shards as f64 };
+    let mut sum = SumVisitor {
+        parts: Vec::new(),
+        sum: GradientsParams::new(),
+        squares: 0.0,
+        scale: 1.0 / shards as f64,
+    };
     let mut losses = Losses::new();
     for part in parts {
         let (gradients, part_losses) = part?;
@@ -221,7 +231,11 @@ fn branch_terms(
     let (r, t) = (branch.rotation.clone(), branch.translation.clone());
     terms.add(name, registration_loss(r, t, rotation.clone(), translation.clone()), 1.0);
     let (points, matches) = (branch.source_points.clone(), branch.matches.clone());
-    terms.add(correspondence, correspondence_loss(points, matches, rotation.clone(), translation.clone()), weight);
+    terms.add(
+        correspondence,
+        correspondence_loss(points, matches, rotation.clone(), translation.clone()),
+        weight,
+    );
 }
 
 /// The losses of the skeleton module.

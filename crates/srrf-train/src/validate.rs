@@ -57,7 +57,8 @@ pub fn validate(
         ];
         let posed = transform(output.source_skeleton.points, rotation, translation);
         let target = output.target_skeleton.points;
-        let skeletons = (chamfer(posed, target.clone()).into_scalar::<f64>(), spread(target).into_scalar::<f64>());
+        let skeletons =
+            (chamfer(posed, target.clone()).into_scalar::<f64>(), spread(target).into_scalar::<f64>());
         Some((poses, skeletons))
     };
     let results = workers.map(chunks.len(), run).ok_or(ValidateError::Failed)?;

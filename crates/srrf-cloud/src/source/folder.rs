@@ -12,7 +12,8 @@ use crate::io::{is_cloud_file, read_cloud};
 /// Depth to which folders in folders are searched.
 const MAX_DEPTH: usize = 8;
 
-/// Files that are read at each sampling, in the frame and unit of the file.
+/// Files that are read at each sampling, each brought to zero mean and unit radius: severities of
+/// corruptions and ranges of translations are lengths in that frame.
 ///
 /// The points of a scan are often in the order of the scan, so a sampling takes random ones.
 #[derive(Debug)]
@@ -89,7 +90,8 @@ fn is_note(path: &Path) -> bool {
 impl Folder {
     fn drawn(&self, index: usize, count: usize, rng: &mut ChaCha8Rng) -> Result<Vec<[f64; 3]>, SourceError> {
         let file = self.files.get(index).ok_or(SourceError::NoSuchShape { index, len: self.files.len() })?;
-        let mut points = read_cloud(&file.path)?.into_points();
+        let (unit, _) = read_cloud(&file.path)?.to_unit_sphere();
+        let mut points = unit.into_points();
         Ok(points.partial_shuffle(rng, count).0.to_vec())
     }
 
@@ -171,7 +173,10 @@ mod tests {
 
         let cloud = shapes.sample(2, 13, &mut rng()).unwrap();
         assert_eq!(cloud.len(), 13);
-        assert!(cloud.points().iter().any(|p| p[0] > 14.0), "points from all of the file");
+        assert!(cloud.points().iter().any(|p| p[0] > 0.4), "points from all of the file");
+        let all = shapes.sample(2, 21, &mut rng()).unwrap();
+        assert!(all.centroid().norm() < 1e-12, "centred");
+        assert!((all.points().iter().map(|p| p[0]).fold(0.0, f64::max) - 1.0).abs() < 1e-12, "unit radius");
         assert_eq!(shapes.sample(2, 99, &mut rng()).unwrap().len(), 21);
         for (count, each) in [(4, 4), (10, 10), (99, 10)] {
             let (a, b) = shapes.sample_two(2, count, &mut rng()).unwrap();
