@@ -51,10 +51,10 @@ impl CleanShape {
 /// skeleton that has collapsed to a point agrees perfectly: read `spread` too.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SkeletonAgreement {
-    /// Mean squared distance to the nearest point, both ways added.
-    pub mean_squared: f64,
+    /// Mean squared distance to the nearest point of the other skeleton, both ways added.
+    pub chamfer: f64,
     /// Sum of the distances to the nearest point, over the points of both skeletons.
-    pub sum: f64,
+    pub chamfer_sum: f64,
     /// Root mean square distance of the points of both skeletons from the mean of their own.
     pub spread: f64,
 }
@@ -83,9 +83,20 @@ impl SkeletonAgreement {
         };
         let count = (source.len() + target.len()) as f64;
         Ok(Self {
-            mean_squared: mean(&forth) + mean(&back),
-            sum: forth.iter().chain(&back).map(|d| d.sqrt()).sum(),
+            chamfer: mean(&forth) + mean(&back),
+            chamfer_sum: forth.iter().chain(&back).map(|d| d.sqrt()).sum(),
             spread: ((deviation(&source) + deviation(&target)) / count).sqrt(),
+        })
+    }
+
+    /// The mean of each number; `None` without any.
+    pub fn mean(agreements: &[Self]) -> Option<Self> {
+        let count = agreements.len() as f64;
+        let average = |value: fn(&Self) -> f64| agreements.iter().map(value).sum::<f64>() / count;
+        (!agreements.is_empty()).then(|| Self {
+            chamfer: average(|a| a.chamfer),
+            chamfer_sum: average(|a| a.chamfer_sum),
+            spread: average(|a| a.spread),
         })
     }
 }
@@ -146,9 +157,13 @@ mod tests {
         // Moved by 1 along x: (0, 0, 0) and (2, 0, 0), against (0, 3, 0).
         let found =
             SkeletonAgreement::new(&[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], &[[0.0, 3.0, 0.0]], &truth).unwrap();
-        assert!((found.mean_squared - ((9.0 + 13.0) / 2.0 + 9.0)).abs() < 1e-12);
-        assert!((found.sum - (3.0 + 13.0_f64.sqrt() + 3.0)).abs() < 1e-12);
+        assert!((found.chamfer - ((9.0 + 13.0) / 2.0 + 9.0)).abs() < 1e-12);
+        assert!((found.chamfer_sum - (3.0 + 13.0_f64.sqrt() + 3.0)).abs() < 1e-12);
         assert!((found.spread - (2.0_f64 / 3.0).sqrt()).abs() < 1e-12);
         assert_eq!(SkeletonAgreement::new(&[], &[[0.0; 3]], &truth), Err(CloudError::Empty));
+        let perfect = SkeletonAgreement { chamfer: 0.0, chamfer_sum: 0.0, spread: 0.0 };
+        let mean = SkeletonAgreement::mean(&[found, perfect]).unwrap();
+        assert!((mean.chamfer - found.chamfer / 2.0).abs() < 1e-12);
+        assert_eq!(SkeletonAgreement::mean(&[]), None);
     }
 }

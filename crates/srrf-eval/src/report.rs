@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::{Serialize, Serializer};
 use srrf_cloud::{EulerXyz, Rigid};
 
+use crate::chamfer::SkeletonAgreement;
 use crate::run::{Answer, Outcome, PairRecord};
 use crate::summary::Summary;
 use crate::{EvalError, curves, output, quantities::QUANTITIES, table};
@@ -208,6 +209,8 @@ struct AnswerRow<'a> {
     converged: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     seconds: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    skeletons: Option<SkeletonAgreement>,
 }
 
 impl<'a> AnswerRow<'a> {
@@ -227,6 +230,7 @@ impl<'a> AnswerRow<'a> {
             iterations: answer.iterations,
             converged: answer.converged,
             seconds: answer.seconds,
+            skeletons: answer.skeletons,
         }
     }
 }

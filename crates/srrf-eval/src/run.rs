@@ -7,7 +7,7 @@ use srrf_cloud::{Registration, Rigid};
 use srrf_corrupt::oracle_pose;
 
 use crate::EvalError;
-use crate::chamfer::CleanShape;
+use crate::chamfer::{CleanShape, SkeletonAgreement};
 use crate::methods::{Method, ORACLE};
 use crate::metrics::{PairError, is_finite};
 use crate::pairs::{EvalPair, Group, PairSource};
@@ -44,6 +44,9 @@ pub struct Answer {
     pub converged: Option<bool>,
     /// Time of the call, divided by the pairs in it; `None` for transforms from a file.
     pub seconds: Option<f64>,
+    /// How well the skeletons agree under the true pose; only in the row of a method that makes
+    /// skeletons, not in those of its branches.
+    pub skeletons: Option<SkeletonAgreement>,
 }
 
 /// A pair with the answers of all rows.
@@ -191,6 +194,11 @@ impl Run<'_> {
             seconds,
             iterations: Some(registration.iterations),
             converged: Some(registration.converged),
+            skeletons: registration
+                .skeletons
+                .as_ref()
+                .filter(|_| row == method.register.name())
+                .and_then(|s| SkeletonAgreement::new(&s.source, &s.target, truth).ok()),
             ..Answer::new(pose, failure, truth)
         }
     }
@@ -214,13 +222,13 @@ fn pose_of_row(registration: &Registration, method: &str, row: &str) -> Option<R
 impl Answer {
     fn new(pose: Option<Rigid>, failure: Option<String>, truth: &Rigid) -> Self {
         let error = PairError::new(pose.as_ref(), truth);
-        Self { error, pose, failure, iterations: None, converged: None, seconds: None }
+        Self { error, pose, failure, iterations: None, converged: None, seconds: None, skeletons: None }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::{Branch, PointCloud, Register, RegisterError};
+    use srrf_cloud::{Branch, PointCloud, Register, RegisterError, Skeletons};
     use srrf_corrupt::{CorruptionKind, PairConfig, Severity};
 
     use super::*;
@@ -244,7 +252,10 @@ mod tests {
             broken.rotation[(0, 0)] = f64::NAN;
             let branch = |name, target_from_source| Branch { name, target_from_source, inlier_ratio: 0.0 };
             let branches = vec![branch("left", Rigid::identity()), branch("right", broken)];
-            Ok(Registration { branches, ..Registration::from_pose(Rigid::identity()) })
+            // Skeletons that agree under no pose but the identity.
+            let skeleton = vec![[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]];
+            let skeletons = Some(Skeletons { source: skeleton.clone(), target: skeleton });
+            Ok(Registration { branches, skeletons, ..Registration::from_pose(Rigid::identity()) })
         }
     }
 
@@ -303,6 +314,7 @@ mod tests {
                 failed += 1;
             } else {
                 assert!(right.failure.as_ref().unwrap().contains("not finite"));
+                assert!(moody.skeletons.unwrap().chamfer > 1e-3 && left.skeletons.is_none());
                 answered += 1;
             }
             assert!(!oracle.error.failed);

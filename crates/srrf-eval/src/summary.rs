@@ -3,6 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use crate::EvalError;
+use crate::chamfer::SkeletonAgreement;
 use crate::metrics::{PairError, Scores};
 use crate::run::Outcome;
 
@@ -49,6 +50,8 @@ pub struct SummaryRow {
     pub seconds_per_pair: Option<f64>,
     /// Scores without the classes that are symmetric about an axis; `None` where all are.
     pub no_symmetric: Option<Scores>,
+    /// How well the skeletons agree; `None` for methods without skeletons.
+    pub skeletons: Option<SkeletonAgreement>,
 }
 
 /// All rows: corruption by corruption; in each the severities, then their mean; in each the methods
@@ -138,6 +141,7 @@ fn row(outcome: &Outcome, group: usize, method: usize) -> Result<SummaryRow, Eva
     let asymmetric: Vec<PairError> =
         of_group().filter(|r| !r.symmetric).map(|r| r.answers[method].error).collect();
     let seconds: Vec<f64> = of_group().filter_map(|r| r.answers[method].seconds).collect();
+    let skeletons: Vec<SkeletonAgreement> = of_group().filter_map(|r| r.answers[method].skeletons).collect();
     let scores = |errors: &[PairError]| {
         Scores::from_errors(errors).map_err(|source| EvalError::Metric {
             group: outcome.groups[group].name(),
@@ -152,6 +156,7 @@ fn row(outcome: &Outcome, group: usize, method: usize) -> Result<SummaryRow, Eva
         scores: scores(&errors)?,
         seconds_per_pair: (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64),
         no_symmetric: (!asymmetric.is_empty()).then(|| scores(&asymmetric)).transpose()?,
+        skeletons: SkeletonAgreement::mean(&skeletons),
     })
 }
 
@@ -161,6 +166,7 @@ fn mean(rows: &[&SummaryRow]) -> Option<SummaryRow> {
     let scores: Vec<Scores> = rows.iter().map(|r| r.scores).collect();
     let asymmetric: Vec<Scores> = rows.iter().filter_map(|r| r.no_symmetric).collect();
     let seconds: Vec<f64> = rows.iter().filter_map(|r| r.seconds_per_pair).collect();
+    let skeletons: Vec<SkeletonAgreement> = rows.iter().filter_map(|r| r.skeletons).collect();
     Some(SummaryRow {
         corruption: first.corruption.clone(),
         severity: SeverityKey::Mean,
@@ -168,6 +174,7 @@ fn mean(rows: &[&SummaryRow]) -> Option<SummaryRow> {
         scores: Scores::mean(&scores)?,
         seconds_per_pair: (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64),
         no_symmetric: Scores::mean(&asymmetric),
+        skeletons: SkeletonAgreement::mean(&skeletons),
     })
 }
 
@@ -199,6 +206,11 @@ pub(crate) mod tests {
                         iterations: Some(4),
                         converged: Some(true),
                         seconds: Some(0.5),
+                        skeletons: (scale > 1.0).then_some(SkeletonAgreement {
+                            chamfer: 1e-4 * f64::from(group.severity),
+                            chamfer_sum: 2.0,
+                            spread: 0.3,
+                        }),
                     }
                 });
                 records.push(PairRecord {
@@ -274,5 +286,7 @@ pub(crate) mod tests {
             assert!(!first[field].is_null() && !mean[field].is_null(), "{field}");
         }
         assert_eq!(first["no_symmetric"]["pairs"], 1);
+        assert!(json[0]["skeletons"].is_null());
+        assert_eq!(json[1]["skeletons"]["spread"], 0.3);
     }
 }

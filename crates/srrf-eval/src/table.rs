@@ -36,6 +36,7 @@ pub(crate) fn markdown(summary: &Summary, head: &str) -> String {
             text.push('\n');
         }
     }
+    text += &skeletons(summary);
     text += "# Time and failures\n\n";
     text += &costs(summary);
     text
@@ -101,6 +102,31 @@ fn by_severity(quantity: &Quantity, summary: &Summary) -> String {
     }
     format!("## {}\n\n{}", quantity.title, aligned(&lines))
 }
+
+/// Agreement of the skeletons of each method that makes them; empty where none does.
+fn skeletons(summary: &Summary) -> String {
+    let head = ["corruption", "method", "Chamfer x 10^4", "sum of distances", "spread"];
+    let mut lines = vec![head.map(str::to_owned).to_vec()];
+    for row in summary.rows.iter().filter(|r| r.severity == SeverityKey::Mean) {
+        if let Some(s) = row.skeletons {
+            let (corruption, method) = (row.corruption.clone(), row.method.clone());
+            let numbers = [format!("{:.3}", 1e4 * s.chamfer), format!("{:.3}", s.chamfer_sum)];
+            lines.push(
+                [vec![corruption, method], numbers.to_vec(), vec![format!("{:.3}", s.spread)]].concat(),
+            );
+        }
+    }
+    if lines.len() == 1 {
+        return String::new();
+    }
+    format!("# Skeletons\n\n{SKELETON_NOTES}\n{}\n", aligned(&lines))
+}
+
+const SKELETON_NOTES: &str = "\
+Between the source's skeleton, moved by the true pose, and the target's: the mean squared distance to the \
+nearest point, both ways added; the plain sum of those distances; and the spread (root mean square distance \
+from the mean) of both skeletons, which a collapse would bring to 0.
+";
 
 /// Pairs, failures and time of each method over the whole run.
 fn costs(summary: &Summary) -> String {
@@ -236,9 +262,18 @@ mod tests {
     #[test]
     fn markdown_has_every_part() {
         let text = markdown(&summary(), "- Seed 1\n");
-        for part in ["- Seed 1", "# Without the classes", "# By severity", "s = 3", "# Time and failures"] {
+        for part in [
+            "- Seed 1",
+            "# Without the classes",
+            "# By severity",
+            "s = 3",
+            "# Skeletons",
+            "# Time and failures",
+        ] {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
+        let skeletons = ["", "cutout", "b", "2.000", "2.000", "0.300", ""];
+        assert!(text.lines().any(|l| l.split('|').map(str::trim).eq(skeletons)), "{text}");
         // 3 groups of 2 pairs at 0.5 s.
         assert!(
             text.lines().any(|l| l.split('|').map(str::trim).eq(["", "a", "6", "0", "500.00", ""])),
