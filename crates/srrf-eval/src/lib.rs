@@ -20,7 +20,6 @@ mod error;
 mod methods;
 mod metrics;
 mod npz_writer;
-mod output;
 mod pair_file;
 mod pairs;
 mod quantities;

@@ -1,26 +1,26 @@
 //! [`NpzWriter`]: writes NumPy's `.npz` archives.
 
 use std::cell::Cell;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, Write};
 use std::rc::Rc;
 
 use zip::CompressionMethod;
-use zip::write::SimpleFileOptions;
+use zip::write::{SimpleFileOptions, StreamWriter};
 
 use crate::arrays::Array;
 
 /// Writes a `.npz` file array by array; the same arrays give the same bytes.
-pub struct NpzWriter<W: Write + Seek> {
-    zip: zip::ZipWriter<Fallible<W>>,
+pub struct NpzWriter<W: Write> {
+    zip: zip::ZipWriter<StreamWriter<Fallible<W>>>,
     error: Rc<Cell<Option<io::Error>>>,
 }
 
-impl<W: Write + Seek> NpzWriter<W> {
+impl<W: Write> NpzWriter<W> {
     /// Starts an archive.
     pub fn new(stream: W) -> Self {
         let error = Rc::new(Cell::new(None));
-        let stream = Fallible { stream, error: error.clone(), failed: false, position: 0, end: 0 };
-        Self { zip: zip::ZipWriter::new(stream), error }
+        let stream = Fallible { stream, error: error.clone(), failed: false };
+        Self { zip: zip::ZipWriter::new_stream(stream), error }
     }
 
     /// Adds an array of `f64`, uncompressed as `numpy.savez` does.
@@ -42,9 +42,9 @@ impl<W: Write + Seek> NpzWriter<W> {
     /// Ends the archive.
     ///
     /// # Errors
-    /// Those of the stream.
+    /// Those of the stream, now or before.
     pub fn finish(self) -> io::Result<W> {
-        let mut stream = self.zip.finish()?;
+        let mut stream = self.zip.finish()?.into_inner();
         stream.flush()?;
         if stream.failed {
             let told_before = || io::Error::other("the archive is incomplete");
@@ -60,8 +60,6 @@ struct Fallible<W> {
     stream: W,
     error: Rc<Cell<Option<io::Error>>>,
     failed: bool,
-    position: u64,
-    end: u64,
 }
 
 impl<W> Fallible<W> {
@@ -73,18 +71,15 @@ impl<W> Fallible<W> {
 
 impl<W: Write> Write for Fallible<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut written = bytes.len();
         if !self.failed {
             match self.stream.write(bytes) {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => return Err(error),
                 Err(error) => self.fail(error),
                 Ok(0) if !bytes.is_empty() => self.fail(io::ErrorKind::WriteZero.into()),
-                Ok(n) => written = n,
+                Ok(written) => return Ok(written),
             }
         }
-        self.position += written as u64;
-        self.end = self.end.max(self.position);
-        Ok(written)
+        Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -97,26 +92,6 @@ impl<W: Write> Write for Fallible<W> {
     }
 }
 
-impl<W: Seek> Seek for Fallible<W> {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        if !self.failed {
-            match self.stream.seek(to) {
-                Ok(position) => {
-                    self.position = position;
-                    return Ok(position);
-                }
-                Err(error) => self.fail(error),
-            }
-        }
-        self.position = match to {
-            SeekFrom::Start(position) => position,
-            SeekFrom::Current(offset) => self.position.saturating_add_signed(offset),
-            SeekFrom::End(offset) => self.end.saturating_add_signed(offset),
-        };
-        Ok(self.position)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,10 +100,10 @@ mod tests {
     #[test]
     fn archives_have_stable_bytes() {
         let write = || {
-            let mut npz = NpzWriter::new(io::Cursor::new(Vec::new()));
+            let mut npz = NpzWriter::new(Vec::new());
             npz.array("a_x", &[1, 2, 3], &[1.0; 6]).unwrap();
             npz.array("a_t", &[1, 3], &[2.0; 3]).unwrap();
-            npz.finish().unwrap().into_inner()
+            npz.finish().unwrap()
         };
         assert_eq!(write(), write());
         let file = tempfile::NamedTempFile::new().unwrap();
@@ -143,7 +118,7 @@ mod tests {
     #[test]
     fn a_full_stream_is_one_error() {
         let mut room = [0; 500];
-        let mut npz = NpzWriter::new(io::Cursor::new(&mut room[..]));
+        let mut npz = NpzWriter::new(&mut room[..]);
         npz.array("a", &[2], &[1.0; 2]).unwrap();
         let error = npz.array("b", &[1000], &[1.0; 1000]).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::WriteZero);

@@ -19,13 +19,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Vector3};
+use srrf_cloud::io::write_atomically;
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::Pair;
 
+use crate::EvalError;
 use crate::arrays::{self, Array, ArrayError, Npz};
 use crate::npz_writer::NpzWriter;
 use crate::pairs::{EvalPair, Group, PairSource};
-use crate::{EvalError, output};
 
 /// Largest deviation of `R^T R` from the identity, per entry, in a true rotation: well above
 /// `float32` rounding.
@@ -233,10 +234,41 @@ fn origins(array: &Array, item: usize) -> Vec<Option<u32>> {
 /// [`EvalError`] where a pair cannot be made or the file cannot be written, and where the clouds of
 /// one group differ in size.
 pub fn export(source: &dyn PairSource, path: &Path, after_pair: &mut dyn FnMut()) -> Result<(), EvalError> {
-    let io = |source: io::Error| EvalError::Output { path: path.to_owned(), source };
-    let temporary = output::temporary_beside(path)
-        .map_err(|source| EvalError::ExportPath { path: path.to_owned(), source })?;
-    let mut npz = NpzWriter::new(io::BufWriter::new(temporary));
+    // What goes wrong besides the writing; `None` until the file is open.
+    let mut outcome = None;
+    let written = write_atomically(path, |out| {
+        let result = export_to(source, out, after_pair);
+        let failed = result.is_err();
+        outcome = Some(result);
+        if failed { Err(io::Error::other("the export was given up")) } else { Ok(()) }
+    });
+    let output = |source| EvalError::Output { path: path.to_owned(), source };
+    match (outcome, written) {
+        (None, Err(source)) => Err(EvalError::ExportPath { path: path.to_owned(), source }),
+        (Some(Err(ExportError::Pair(error))), _) => Err(error),
+        (Some(Err(ExportError::Write(source))), _) => Err(output(source)),
+        (_, written) => written.map_err(output),
+    }
+}
+
+/// What stops an export: a pair, or the writing.
+enum ExportError {
+    Pair(EvalError),
+    Write(io::Error),
+}
+
+impl From<io::Error> for ExportError {
+    fn from(error: io::Error) -> Self {
+        Self::Write(error)
+    }
+}
+
+fn export_to(
+    source: &dyn PairSource,
+    out: &mut dyn io::Write,
+    after_pair: &mut dyn FnMut(),
+) -> Result<(), ExportError> {
+    let mut npz = NpzWriter::new(out);
     for (index, group) in source.groups().iter().enumerate() {
         let pairs = (0..group.pairs)
             .map(|item| {
@@ -244,28 +276,29 @@ pub fn export(source: &dyn PairSource, path: &Path, after_pair: &mut dyn FnMut()
                 after_pair();
                 pair
             })
-            .collect::<Result<Vec<_>, _>>()?;
-        write_group(&mut npz, &group.name(), &pairs, &io)?;
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(ExportError::Pair)?;
+        write_group(&mut npz, &group.name(), &pairs)?;
     }
-    let file = npz.finish().map_err(io)?.into_inner().map_err(|e| io(e.into_error()))?;
-    output::persist(file, path).map_err(io)
+    npz.finish()?;
+    Ok(())
 }
 
 /// Writes the arrays of one group.
-fn write_group<W: io::Write + io::Seek>(
+fn write_group<W: io::Write>(
     npz: &mut NpzWriter<W>,
     name: &str,
     pairs: &[EvalPair],
-    io: &dyn Fn(io::Error) -> EvalError,
-) -> Result<(), EvalError> {
+) -> Result<(), ExportError> {
     let n = pairs.len();
     let mut array = |suffix: &str, shape: &[usize], values: Vec<f64>| {
-        npz.array(&format!("{name}_{suffix}"), shape, &values).map_err(io)
+        npz.array(&format!("{name}_{suffix}"), shape, &values)
     };
     let points = |suffix: &str, clouds: Vec<&[[f64; 3]]>| {
         let length = clouds[0].len();
         if clouds.iter().any(|c| c.len() != length) {
-            return Err(EvalError::Ragged { group: name.to_owned(), array: format!("{name}_{suffix}") });
+            let (group, array) = (name.to_owned(), format!("{name}_{suffix}"));
+            return Err(ExportError::Pair(EvalError::Ragged { group, array }));
         }
         Ok((length, clouds.iter().flat_map(|c| c.as_flattened()).copied().collect::<Vec<f64>>()))
     };

@@ -2,16 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
+use srrf_cloud::io::write_atomically;
 use srrf_cloud::{EulerXyz, Rigid};
 
 use crate::chamfer::SkeletonAgreement;
 use crate::run::{Answer, Outcome, PairRecord};
 use crate::summary::Summary;
-use crate::{EvalError, curves, output, quantities::QUANTITIES, table};
+use crate::{EvalError, curves, quantities::QUANTITIES, table};
 
 /// Where a result comes from: what is needed to get it again.
 #[derive(Debug, Clone, Serialize)]
@@ -69,7 +70,10 @@ pub fn machine() -> String {
 /// # Errors
 /// [`EvalError::OutDir`] if not.
 pub fn prepare(out: &Path) -> Result<(), EvalError> {
-    output::prepare_folder(out).map_err(|source| EvalError::OutDir { path: out.to_owned(), source })
+    fs::create_dir_all(out)
+        .and_then(|()| tempfile::tempfile_in(out))
+        .map(drop)
+        .map_err(|source| EvalError::OutDir { path: out.to_owned(), source })
 }
 
 /// Writes the whole report to the folder `out`, file by file under temporary names, and gives the
@@ -86,7 +90,7 @@ pub fn write(
     let mut written = Vec::new();
     let mut text = |name: &str, content: &str| {
         let path = out.join(name);
-        output::write(&path, content.as_bytes())
+        write_atomically(&path, |out| out.write_all(content.as_bytes()))
             .map_err(|source| EvalError::Output { path: path.clone(), source })?;
         written.push(path);
         Ok::<_, EvalError>(())
@@ -120,11 +124,10 @@ pub fn screen(summary: &Summary) -> String {
 }
 
 fn results(path: &Path, meta: &Meta, summary: &Summary, outcome: &Outcome) -> io::Result<()> {
-    let mut writer = BufWriter::new(output::temporary_beside(path)?);
-    serde_json::to_writer(&mut writer, &Results { meta, summary, pairs: Pairs(outcome) })?;
-    writer.write_all(b"\n")?;
-    let file = writer.into_inner().map_err(|e| e.into_error())?;
-    output::persist(file, path)
+    write_atomically(path, |out| {
+        serde_json::to_writer(&mut *out, &Results { meta, summary, pairs: Pairs(outcome) })?;
+        out.write_all(b"\n")
+    })
 }
 
 #[derive(Serialize)]
