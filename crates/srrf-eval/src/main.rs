@@ -1,5 +1,6 @@
 //! `srrf-eval`: scores registration methods on clean and corrupted pairs.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -12,6 +13,7 @@ use srrf_eval::{
 };
 
 fn main() -> ExitCode {
+    srrf_model::keep_freed_memory();
     match run(&Options::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -42,11 +44,14 @@ fn run(options: &Options) -> Result<(), EvalError> {
     }
     let context = MethodContext { weights: options.weights.clone(), device: options.device.clone() };
     let methods = selection.set_up(&context)?;
-    let weights = methods
+    let weights: BTreeMap<String, String> = methods
         .iter()
         .filter_map(|(_, m)| Some((m.register.name().to_owned(), m.weights.clone()?)))
-        .inspect(|(name, weights)| say(&format!("weights of {name}: {weights}")))
         .collect();
+    if weights.is_empty() {
+        say("weights: none are needed, since no method that learns is run");
+    }
+    weights.iter().for_each(|(name, weights)| say(&format!("weights of {name}: {weights}")));
     if let Some(path) = &options.export_pairs {
         let bar = progress(pairs.as_ref(), "exporting");
         srrf_eval::export(pairs.as_ref(), path, &mut || bar.inc(1))?;

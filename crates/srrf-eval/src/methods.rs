@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use srrf_baselines::{Icp, IcpConfig, Identity};
 use srrf_cloud::Register;
+use srrf_model::{SrrfRegister, embedded, weights};
 
 use crate::EvalError;
 use crate::transforms::Transforms;
@@ -56,10 +57,29 @@ pub const METHODS: &[MethodEntry] = &[
         by_default: false,
         build: |_| Ok(plain(Icp::new(IcpConfig { centred: true, ..IcpConfig::default() }))),
     },
+    MethodEntry {
+        name: "srrf",
+        rows: &["srrf-dense", "srrf-skeleton", "srrf"],
+        by_default: true,
+        build: srrf,
+    },
 ];
 
 fn plain(register: impl Register + 'static) -> Method {
     Method { register: Box::new(register), weights: None, parallel_inside: false }
+}
+
+/// The network, with the weights of `--weights` or those in the program.
+fn srrf(context: &MethodContext) -> Result<Method, String> {
+    let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
+    let (loaded, origin) = match &context.weights {
+        Some(path) => (weights::load(path, &device), path.display().to_string()),
+        None => (embedded::load_default(&device), "in the program".to_owned()),
+    };
+    let loaded = loaded.map_err(|e| e.to_string())?;
+    let data = loaded.metadata.get("data").map_or("unknown data", String::as_str);
+    let weights = format!("{} ({origin}, sha256 {}), trained on {data}", loaded.name, &loaded.sha256[..16]);
+    Ok(Method { weights: Some(weights), ..plain(SrrfRegister::new(loaded, device)) })
 }
 
 /// The rows of a run and the methods that fill them.

@@ -1,0 +1,89 @@
+//! Scores the ways to use trained weights on the validation part of the training set: passes,
+//! tokens, inlier test. The test split plays no part. The tables of docs/experiments.md come from
+//!
+//! ```sh
+//! cargo run -p srrf-train --example inference_choices -- configs/modelnet-small.toml WEIGHTS DATA
+//! ```
+
+use std::path::Path;
+
+use srrf_cloud::source::{Split, open};
+use srrf_cloud::{PointCloud, Register};
+use srrf_corrupt::{Pair, Severity};
+use srrf_eval::{PairError, Scores};
+use srrf_model::{InlierTest, SrrfRegister, device, keep_freed_memory, weights};
+use srrf_train::config::TrainConfig;
+use srrf_train::data::PairSource;
+use srrf_train::step::Workers;
+
+#[allow(clippy::print_stdout, reason = "an example that prints a table")]
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    keep_freed_memory();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [config, weights_path, data] = arguments.as_slice() else {
+        return Err("usage: inference_choices CONFIG WEIGHTS DATA".into());
+    };
+    let config = TrainConfig::read(Path::new(config))?;
+    let pairs = PairSource::new(&config, open(Path::new(data), Split::Train)?);
+    let mut held_out: Vec<Pair> = Vec::new();
+    for severity in [2, 3, 4] {
+        held_out.extend(pairs.validation(Severity::try_from(severity)?)?);
+    }
+    let workers = Workers::new(std::thread::available_parallelism().map_or(1, usize::from))?;
+    println!(
+        "{}; {} pairs at severities 2 to 4; RMSE / MAE / median of R in degrees",
+        pairs.description(),
+        held_out.len()
+    );
+    let tests = [
+        ("nearest .05", InlierTest::Nearest, 0.05),
+        ("nearest .10", InlierTest::Nearest, 0.10),
+        ("soft match", InlierTest::SoftMatch, 0.05),
+    ];
+    for (passes, tokens) in [(1, 128), (1, 256), (2, 128), (2, 256), (3, 256)] {
+        for (name, test, threshold) in tests {
+            let device = device("flex")?;
+            let mut loaded = weights::load(Path::new(weights_path), &device)?;
+            loaded.model.dense = loaded.model.dense.with_tokens(tokens);
+            loaded.config.integration.test = test;
+            loaded.config.integration.dense_threshold = threshold;
+            loaded.config.integration.skeleton_threshold =
+                if test == InlierTest::SoftMatch { 0.1 } else { threshold };
+            let mut method = SrrfRegister::new(loaded, device);
+            method.passes = passes;
+            let rows = score(&method, &held_out, &workers)?;
+            println!("| {passes} | {tokens} | {name} | {} |", rows.join(" | "));
+        }
+    }
+    Ok(())
+}
+
+/// Dense, skeleton and fused poses of a method, as `RMSE / MAE / median`.
+fn score(
+    method: &SrrfRegister,
+    pairs: &[Pair],
+    workers: &Workers,
+) -> Result<Vec<String>, Box<dyn std::error::Error>> {
+    let clouds = |pair: &Pair| -> (PointCloud, PointCloud) { (pair.source.clone(), pair.target.clone()) };
+    let answers = workers
+        .map(pairs.len(), |i| {
+            let (source, target) = clouds(&pairs[i]);
+            let answer = method.register(&source, &target).ok()?;
+            let branch = |b: usize| answer.branches.get(b).map(|branch| branch.target_from_source);
+            Some([branch(0), branch(1), Some(answer.target_from_source)])
+        })
+        .ok_or("a worker stopped")?;
+    (0..3)
+        .map(|row| {
+            let errors: Vec<PairError> = pairs
+                .iter()
+                .zip(&answers)
+                .map(|(pair, poses)| {
+                    PairError::new(poses.and_then(|p| p[row]).as_ref(), &pair.target_from_source)
+                })
+                .collect();
+            let s = Scores::from_errors(&errors)?;
+            Ok(format!("{:.2} / {:.2} / {:.2}", s.rmse_r, s.mae_r, s.median_rot_deg))
+        })
+        .collect()
+}
