@@ -4,10 +4,13 @@
 //! python3 scripts/parity_reference.py crates/srrf-model/tests/fixtures/parity.json
 //! ```
 //!
-//! The reference computes in `f64`. Here every part runs twice. In `f64` it must agree to `1e-9` of
-//! the largest number of a tensor, which leaves room for rounding and for nothing else. In `f32`,
-//! the type that the network runs in, sums of some hundred products are off by a few hundred times
-//! `6e-8`, and the layers and the SVD carry that on: `2e-3` for values, `2e-2` for gradients.
+//! The reference computes in `f64`. Here every part runs twice, and a tensor's largest error is
+//! taken over its largest number. In `f64` values must agree to `1e-9`, which leaves room for
+//! rounding and for nothing else, and gradients to `1e-6`: Burn's backward passes round some factors
+//! to `f32` (`6e-8`). In `f32`, the type that the network runs in, sums of some hundred products in
+//! another order are off by several times `6e-8`, and the layers and the SVD, whose gradient grows
+//! with one over the gap of its singular values, carry that on: `2e-5` for values, `1e-4` for
+//! gradients.
 
 mod common;
 
@@ -24,7 +27,7 @@ use srrf_model::{
 };
 
 /// The types to run in, with the tolerances of values and of gradients.
-const TYPES: [(DType, f64, f64); 2] = [(DType::F64, 1e-9, 1e-9), (DType::F32, 2e-3, 2e-2)];
+const TYPES: [(DType, f64, f64); 2] = [(DType::F64, 1e-9, 1e-6), (DType::F32, 2e-5, 1e-4)];
 
 #[derive(Deserialize)]
 struct Numbered {
@@ -106,9 +109,9 @@ impl Reference {
         assert_eq!(found.found.keys().collect::<Vec<_>>(), wanted.keys().collect::<Vec<_>>());
         let largest = wanted.values().map(|[norm, _]| *norm).fold(0.0, f64::max);
         for (path, wanted) in wanted {
-            // Some gradients are 0 by construction (a bias before a softmax): compare those with
-            // the others' size.
-            let scale = wanted[0].max(1e-3 * largest);
+            // Some gradients are 0 by construction (a bias before a softmax) and come out as what the
+            // rounding of their terms leaves: compare those with the others' size.
+            let scale = wanted[0].max(1e-2 * largest);
             let error = difference(&found.found[&path], &wanted) / scale;
             assert!(
                 error < self.gradient_tolerance,
@@ -225,34 +228,34 @@ fn skeleton_module() {
 #[test]
 fn skeleton_losses() {
     for reference in Reference::each() {
-        let [source, target, skeletons] =
-            ["source", "target", "skeletons"].map(|name| reference.tensor::<3>(&format!("losses.{name}")));
-        let radii = reference.tensor::<2>("losses.radii");
-        let half = |which: usize| Skeleton {
-            points: skeletons.clone().narrow(0, 2 * which, 2),
-            radii: radii.clone().narrow(0, 2 * which, 2),
-            // The losses look at neither of these.
-            weights: Tensor::zeros([2, 1, 11], &reference.device),
-            samples: Tensor::zeros([2, 1, 3], &reference.device),
-        };
-        let config: SkeletonLossConfig = reference.get("loss");
-        let losses = skeleton_loss(
-            &config,
-            (source.clone(), &half(0)),
-            (target.clone(), &half(1)),
-            reference.tensor("losses.rotation"),
-            reference.tensor("losses.translation"),
-        );
-        let pretraining = chamfer(skeletons.clone(), Tensor::cat(vec![source, target], 0));
-        for (name, loss, of_points, of_radii) in [
-            ("sampling", losses.sampling, true, true),
-            ("point_to_sphere", losses.point_to_sphere, true, true),
-            ("radius", losses.radius, false, true),
-            ("distribution", losses.distribution, true, false),
-            ("index_match", losses.index_match, true, false),
-            ("total", losses.total, true, true),
-            ("chamfer", pretraining, true, false),
-        ] {
+        // A graph serves one backward pass: each loss is made anew.
+        let compare = |name: &str, of_points: bool, of_radii: bool| {
+            let [source, target, skeletons] = ["source", "target", "skeletons"]
+                .map(|name| reference.tensor::<3>(&format!("losses.{name}")));
+            let radii = reference.tensor::<2>("losses.radii");
+            let half = |which: usize| Skeleton {
+                points: skeletons.clone().narrow(0, 2 * which, 2),
+                radii: radii.clone().narrow(0, 2 * which, 2),
+                // The losses look at neither of these.
+                weights: Tensor::zeros([2, 1, 11], &reference.device),
+                samples: Tensor::zeros([2, 1, 3], &reference.device),
+            };
+            let losses = skeleton_loss(
+                &reference.get::<SkeletonLossConfig>("loss"),
+                (source.clone(), &half(0)),
+                (target.clone(), &half(1)),
+                reference.tensor("losses.rotation"),
+                reference.tensor("losses.translation"),
+            );
+            let loss = match name {
+                "sampling" => losses.sampling,
+                "point_to_sphere" => losses.point_to_sphere,
+                "radius" => losses.radius,
+                "distribution" => losses.distribution,
+                "index_match" => losses.index_match,
+                "total" => losses.total,
+                _ => chamfer(skeletons.clone(), Tensor::cat(vec![source, target], 0)),
+            };
             reference.compare(&format!("losses.{name}"), &loss);
             let grads = loss.backward();
             if of_points {
@@ -261,18 +264,22 @@ fn skeleton_losses() {
             if of_radii {
                 reference.compare_gradient(&format!("losses.{name}.gradient.radii"), &radii, &grads);
             }
-        }
+        };
+        compare("sampling", true, true);
+        compare("point_to_sphere", true, true);
+        compare("radius", false, true);
+        compare("distribution", true, false);
+        compare("index_match", true, false);
+        compare("total", true, true);
+        compare("chamfer", true, false);
     }
 }
 
 #[test]
 fn structural_features() {
     for reference in Reference::each() {
-        let network = reference.network();
-        // The extractor of the dense branch, which the network does not hand out.
         let sfe = reference.config.dense.sfe.init(&Device::flex());
         let sfe = filled_as(sfe, "dense.sfe", reference.dtype);
-        drop(network);
         let cloud = reference.tensor::<3>("sfe.cloud");
         let features = sfe.forward(reference.tensor("sfe.tokens"), cloud.clone());
         reference.compare("sfe.features", &features);
