@@ -1,5 +1,7 @@
 //! Training through its front door: resume, kill, threads, bad input, a full disk.
 
+#![allow(clippy::unwrap_used, reason = "a test may fail loudly")]
+
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Stdio;

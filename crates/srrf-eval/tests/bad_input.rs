@@ -107,9 +107,10 @@ fn pairs_that_cannot_be_registered_are_counted() {
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let made = common::results(
         folder.path(),
-        &["--shapes", "1", "--points", "3", "--clean-only", "--methods", "icp,oracle"],
+        &["--shapes", "1", "--points", "3", "--clean-only", "--methods", "icp,oracle,srrf"],
     );
     assert_eq!(common::row(&made, "clean", 0, "icp")["pairs"], 1);
+    assert_eq!(common::row(&made, "clean", 0, "srrf")["failed"], 0, "three points are enough for a pose");
     // Two pairs of 4 points: on a line, and not.
     let line = [0.0, 1.0, 2.0, 3.0].map(|i| [i, 2.0 * i, -i]);
     let corner = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -120,9 +121,38 @@ fn pairs_that_cannot_be_registered_are_counted() {
     file.array("few_R", &[2, 3, 3], [identity; 2].as_flattened().as_flattened()).unwrap();
     file.array("few_t", &[2, 3], &[0.0; 6]).unwrap();
     file.finish().unwrap();
-    let results = common::results(folder.path(), &["--pairs", "few.npz", "--methods", "icp"]);
-    assert_eq!(common::row(&results, "few", 0, "icp")["failed"], 1);
-    let failure = results["pairs"][0]["methods"]["icp"]["failure"].as_str().unwrap();
-    assert!(failure.contains("one line"), "{failure}");
-    assert_eq!(results["pairs"][1]["methods"]["icp"]["failed"], false);
+    let results = common::results(folder.path(), &["--pairs", "few.npz", "--methods", "icp,srrf"]);
+    for method in ["icp", "srrf"] {
+        assert_eq!(common::row(&results, "few", 0, method)["failed"], 1);
+        let failure = results["pairs"][0]["methods"][method]["failure"].as_str().unwrap();
+        assert!(failure.contains("one line"), "{failure}");
+        assert_eq!(results["pairs"][1]["methods"][method]["failed"], false);
+    }
+}
+
+#[test]
+fn weights_of_another_architecture_are_refused_by_parameter() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = ["--shapes", "1", "--clean-only", "--methods", "srrf", "--weights"];
+    let refused = |name: &str| refusal(folder.path(), &[&small[..], &[name]].concat());
+    assert!(refused("none.safetensors").contains("none.safetensors"));
+
+    let whole = include_bytes!("../../srrf-model/weights/srrf-small.safetensors");
+    fs::write(folder.path().join("cut.safetensors"), &whole[..whole.len() / 3]).unwrap();
+    let message = refused("cut.safetensors");
+    assert!(message.contains("cut.safetensors") && message.contains("not a complete"), "{message}");
+
+    // The same file, whose header describes a network of another size.
+    let (header, other) = (r#"\"skeleton_points\":64"#, r#"\"skeleton_points\":65"#);
+    let at = whole.windows(header.len()).position(|w| w == header.as_bytes()).unwrap();
+    let mut changed = whole.to_vec();
+    changed[at..at + other.len()].copy_from_slice(other.as_bytes());
+    fs::write(folder.path().join("other.safetensors"), &changed).unwrap();
+    let message = refused("other.safetensors");
+    assert!(message.contains("sem.weights") && message.contains("another architecture"), "{message}");
+
+    // A safetensors file that is no network of this program.
+    fs::write(folder.path().join("empty.safetensors"), [&2_u64.to_le_bytes()[..], b"{}"].concat()).unwrap();
+    let message = refused("empty.safetensors");
+    assert!(message.contains("empty.safetensors") && message.contains("srrf_config"), "{message}");
 }
