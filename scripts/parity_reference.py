@@ -5,7 +5,7 @@
 
 Needs torch and numpy, takes a few seconds. The network is in `reference_network.py`, beside this
 file; here each of its parts, then the whole, is run on drawn numbers, and inputs, outputs and
-gradients are written down. `crates/srrf-model/tests/parity.rs` compares them with the crate's.
+gradients are written down. `crates/srrf-model/tests/parity/main.rs` compares them with the crate's.
 """
 
 import json
