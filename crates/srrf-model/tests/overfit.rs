@@ -1,4 +1,5 @@
 //! Learning works: on eight pairs, every branch goes under one degree.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod common;
 

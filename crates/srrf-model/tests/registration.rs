@@ -1,5 +1,6 @@
 //! Clouds in any unit, anywhere: the frame of a pair, batches, and the network behind the
 //! `Register` seam.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod common;
 

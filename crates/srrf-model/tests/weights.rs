@@ -1,4 +1,5 @@
 //! Weights on disk: what comes back, and what is said about files that are broken.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod common;
 

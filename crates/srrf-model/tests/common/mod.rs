@@ -1,5 +1,5 @@
 //! What several tests share: numbers from a documented generator, tensors, small networks, poses.
-#![allow(dead_code, reason = "each test binary uses its own part")]
+#![allow(dead_code, clippy::expect_used, reason = "a part serves some test binaries, and only tests")]
 
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use nalgebra::{Matrix3, Rotation3, Vector3};

@@ -1,4 +1,5 @@
 //! The fixture, the parameters that both sides make, and the comparison.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "helpers of tests")]
 
 use std::collections::BTreeMap;
 
