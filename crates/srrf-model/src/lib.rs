@@ -24,6 +24,7 @@ mod register;
 mod sem;
 mod sem_loss;
 mod sfe;
+mod sizes;
 mod srrf;
 pub mod weights;
 
@@ -40,4 +41,5 @@ pub use register::SrrfRegister;
 pub use sem::{LevelConfig, Sem, SemConfig, Skeleton, nearest_distance};
 pub use sem_loss::{SkeletonLoss, SkeletonLossConfig, chamfer, skeleton_loss, spread};
 pub use sfe::{Sfe, SfeConfig};
+pub use sizes::WrongSize;
 pub use srrf::{Srrf, SrrfConfig, SrrfOutput};

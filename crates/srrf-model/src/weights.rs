@@ -204,6 +204,7 @@ pub fn from_safetensors(bytes: &[u8], origin: &str, device: &Device) -> Result<L
         None => Err("the entry is missing".to_string()),
     }
     .map_err(|why| WeightsError::Header { origin: origin.clone(), why })?;
+    config.check().map_err(|e| WeightsError::Header { origin: origin.clone(), why: e.to_string() })?;
 
     let mut values = BTreeMap::new();
     for (name, view) in SafeTensors::deserialize(bytes).map_err(format)?.tensors() {

@@ -14,7 +14,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use srrf_model::weights::{
     WeightsError, from_safetensors, load, parameters, to_safetensors, with_parameters, write_atomically,
 };
-use srrf_model::{Srrf, init};
+use srrf_model::{Srrf, SrrfConfig, init};
 
 fn model() -> Srrf {
     init::seeded(tiny().init(&Device::flex()), 9)
@@ -149,6 +149,23 @@ fn files_of_other_programs_are_named() {
         header.insert("srrf_config".into(), config);
     });
     assert!(said(&unknown).contains("encoder"));
+    // Sizes that no network can have are found before one is built.
+    let changes: [(&str, fn(&mut SrrfConfig)); 6] = [
+        ("dense.sfe.heads", |c| c.dense.sfe.heads = 0),
+        ("skeleton.pfi.heads", |c| c.skeleton.pfi.heads = 7),
+        ("skeleton.sfe", |c| c.skeleton.sfe.layers = 0),
+        ("sem.levels", |c| c.sem.levels.clear()),
+        ("sem.levels[1].widths", |c| c.sem.levels[1].widths = vec![13, 0]),
+        ("sem.skeleton_points", |c| c.sem.skeleton_points = 2),
+    ];
+    for (key, change) in changes {
+        let impossible = rewritten(|_, header| {
+            let mut config = tiny();
+            change(&mut config);
+            header.insert("srrf_config".into(), serde_json::to_string(&config).unwrap());
+        });
+        assert!(said(&impossible).contains(&format!("`{key}`")), "{}", said(&impossible));
+    }
     let no_json = rewritten(|_, header| drop(header.insert("srrf_config".into(), "{".into())));
     assert!(said(&no_json).contains("srrf_config"));
 }

@@ -1,0 +1,73 @@
+//! The sizes with which a network can be built.
+
+use crate::branch::BranchConfig;
+use crate::sem::SemConfig;
+use crate::srrf::SrrfConfig;
+
+/// A size with which the network cannot be built.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{key}` {why}")]
+pub struct WrongSize {
+    /// Where it stands in the [`SrrfConfig`], such as `dense.sfe.heads`.
+    pub key: String,
+    /// What it must be.
+    pub why: String,
+}
+
+impl SrrfConfig {
+    /// Checks that [`SrrfConfig::init`] and the forward pass can work with these sizes.
+    ///
+    /// # Errors
+    /// [`WrongSize`] for the first one that cannot be.
+    pub fn check(&self) -> Result<(), WrongSize> {
+        check_sem(&self.sem)?;
+        check_branch("dense", &self.dense)?;
+        check_branch("skeleton", &self.skeleton)
+    }
+}
+
+fn wrong(key: String, why: impl Into<String>) -> Result<(), WrongSize> {
+    Err(WrongSize { key, why: why.into() })
+}
+
+fn check_sem(sem: &SemConfig) -> Result<(), WrongSize> {
+    if sem.levels.is_empty() {
+        return wrong("sem.levels".into(), "needs 1 level or more");
+    }
+    for (i, level) in sem.levels.iter().enumerate() {
+        if level.points == 0 || level.neighbours == 0 {
+            return wrong(format!("sem.levels[{i}]"), "needs 1 point and 1 neighbour or more");
+        }
+        if level.widths.is_empty() || level.widths.contains(&0) {
+            return wrong(format!("sem.levels[{i}].widths"), "needs 1 layer or more, each 1 wide or more");
+        }
+    }
+    if sem.global == 0 || sem.head.contains(&0) {
+        return wrong("sem.head".into(), "and sem.global must be 1 wide or more");
+    }
+    if sem.skeleton_points < 3 {
+        return wrong("sem.skeleton_points".into(), "must be 3 or more");
+    }
+    Ok(())
+}
+
+fn check_branch(name: &str, branch: &BranchConfig) -> Result<(), WrongSize> {
+    let (sfe, pfi) = (&branch.sfe, &branch.pfi);
+    if sfe.layers == 0 || sfe.neighbours == 0 || sfe.width == 0 || sfe.mlp == 0 {
+        return wrong(format!("{name}.sfe"), "needs 1 layer, neighbour and channel or more");
+    }
+    if sfe.heads == 0 || !sfe.width.is_multiple_of(sfe.heads) {
+        return wrong(format!("{name}.sfe.heads"), format!("must divide the width, {}", sfe.width));
+    }
+    let width = sfe.output_width();
+    if pfi.heads == 0 || !width.is_multiple_of(pfi.heads) {
+        return wrong(format!("{name}.pfi.heads"), format!("must divide layers * width, {width}"));
+    }
+    if pfi.feed_forward == 0 || pfi.position_hidden == 0 || pfi.squeeze == 0 {
+        return wrong(format!("{name}.pfi"), "needs widths and a squeeze of 1 or more");
+    }
+    if (1..3).contains(&branch.tokens) {
+        return wrong(format!("{name}.tokens"), "must be 0 (all) or 3 or more");
+    }
+    Ok(())
+}
