@@ -141,6 +141,26 @@ fn answers_hold_both_branches() {
 }
 
 #[test]
+fn skeletons_come_in_the_coordinates_of_their_clouds() {
+    let (source, target) = (placed(&cloud(25, 61), 40.0, UTM), cloud(26, 61));
+    let skeletons = network().register(&source, &target).unwrap().skeletons.unwrap();
+    for (cloud, skeleton) in [(&source, skeletons.source), (&target, skeletons.target)] {
+        assert_eq!(skeleton.len(), 19);
+        let slack = 1e-6 * cloud.to_unit_sphere().1.radius;
+        for axis in 0..3 {
+            let of = |points: &[[f64; 3]]| {
+                let values = points.iter().map(|p| p[axis]);
+                (values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max))
+            };
+            let (low, high) = of(cloud.points());
+            let (least, most) = of(&skeleton);
+            assert!(low - slack <= least && most <= high + slack, "inside the box of the cloud");
+            assert!(most > least, "and not one point");
+        }
+    }
+}
+
+#[test]
 fn unusable_clouds_are_refused_by_side() {
     let (network, good) = (network(), cloud(16, 61));
     let cloud = |points: Vec<[f64; 3]>| PointCloud::new(points).unwrap();
