@@ -150,7 +150,8 @@ fn files_of_other_programs_are_named() {
     });
     assert!(said(&unknown).contains("encoder"));
     // Sizes that no network can have are found before one is built.
-    let changes: [(&str, fn(&mut SrrfConfig)); 6] = [
+    type Change = fn(&mut SrrfConfig);
+    let changes: [(&str, Change); 6] = [
         ("dense.sfe.heads", |c| c.dense.sfe.heads = 0),
         ("skeleton.pfi.heads", |c| c.skeleton.pfi.heads = 7),
         ("skeleton.sfe", |c| c.skeleton.sfe.layers = 0),
