@@ -124,7 +124,7 @@ fn answers_hold_both_branches() {
     let network = network();
     assert_eq!(network.name(), "srrf");
     let answer = network.register(&cloud(13, 61), &cloud(14, 67)).unwrap();
-    assert_eq!(answer.iterations, 1);
+    assert_eq!(answer.iterations, 2, "two passes by default");
     assert_eq!(answer.branches.iter().map(|b| b.name).collect::<Vec<_>>(), ["dense", "skeleton"]);
     for branch in &answer.branches {
         assert!((0.0..=1.0).contains(&branch.inlier_ratio));

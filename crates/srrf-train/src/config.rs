@@ -307,39 +307,10 @@ impl TrainConfig {
                 );
             }
         }
-        self.wrong_size()
-    }
-
-    /// The first size of the network that cannot work.
-    fn wrong_size(&self) -> Option<(String, String)> {
-        let network = &self.network;
-        for (name, branch) in [("dense", &network.dense), ("skeleton", &network.skeleton)] {
-            let width = branch.sfe.output_width();
-            if branch.sfe.heads == 0 || branch.sfe.width == 0 || branch.sfe.width % branch.sfe.heads != 0 {
-                return Some((format!("network.{name}.sfe.heads"), "must divide the width".into()));
-            }
-            if branch.sfe.layers == 0 || branch.sfe.neighbours == 0 {
-                return Some((format!("network.{name}.sfe"), "needs 1 layer and 1 neighbour or more".into()));
-            }
-            if branch.pfi.heads == 0 || width % branch.pfi.heads != 0 {
-                return Some((
-                    format!("network.{name}.pfi.heads"),
-                    format!("must divide {width}, layers * width"),
-                ));
-            }
-            if branch.pfi.squeeze == 0 {
-                return Some((format!("network.{name}.pfi.squeeze"), "must be 1 or more".into()));
-            }
+        if self.data.source == DataSource::Shapes && self.seed == srrf_eval::data::TEST_SHAPES_SEED {
+            return wrong("seed", "is the one of the shapes that srrf-eval tests on; choose another");
         }
-        let sem = &network.sem;
-        if sem.levels.is_empty()
-            || sem.levels.iter().any(|l| l.points == 0 || l.neighbours == 0 || l.widths.is_empty())
-        {
-            return Some((
-                "network.sem.levels".into(),
-                "needs a level, each with points, neighbours and widths".into(),
-            ));
-        }
-        (sem.skeleton_points < 3).then(|| ("network.sem.skeleton_points".into(), "must be 3 or more".into()))
+        let checked = self.network.check();
+        checked.err().map(|wrong| (format!("network.{}", wrong.key), wrong.why))
     }
 }
