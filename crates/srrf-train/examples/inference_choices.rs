@@ -13,7 +13,7 @@ use srrf_corrupt::{Pair, Severity};
 use srrf_eval::{PairError, Scores};
 use srrf_model::{InlierTest, SrrfRegister, device, keep_freed_memory, weights};
 use srrf_train::config::TrainConfig;
-use srrf_train::data::PairSource;
+use srrf_train::data::TrainingPairs;
 use srrf_train::step::Workers;
 
 #[allow(clippy::print_stdout, reason = "an example that prints a table")]
@@ -24,11 +24,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err("usage: inference_choices CONFIG WEIGHTS DATA".into());
     };
     let config = TrainConfig::read(Path::new(config))?;
-    let pairs = PairSource::new(&config, open(Path::new(data), Split::Train)?);
-    let mut held_out: Vec<Pair> = Vec::new();
-    for severity in [3] {
-        held_out.extend(pairs.validation(Severity::try_from(severity)?)?);
-    }
+    let pairs = TrainingPairs::new(&config, open(Path::new(data), Split::Train)?);
+    let held_out: Vec<Pair> = pairs.validation(Severity::try_from(3)?)?;
     let workers = Workers::new(std::thread::available_parallelism().map_or(1, usize::from))?;
     println!(
         "{}; {} pairs at severity 3; RMSE / MAE / median of R in degrees",

@@ -283,7 +283,7 @@ impl TrainConfig {
             return wrong("pairs.points", "and draw.independent_points must be 16 or more");
         }
         let optimizer = &self.optimizer;
-        if optimizer.batch == 0 || optimizer.shard == 0 || optimizer.batch % optimizer.shard != 0 {
+        if optimizer.batch == 0 || optimizer.shard == 0 || !optimizer.batch.is_multiple_of(optimizer.shard) {
             return wrong("optimizer.batch", "must be a multiple of optimizer.shard, both 1 or more");
         }
         if !(1..=5).contains(&self.keep.validate_severity) {

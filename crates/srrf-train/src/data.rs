@@ -34,7 +34,7 @@ fn generator(seed: u64, stream: Stream, item: u64) -> ChaCha8Rng {
 }
 
 /// The pairs of a run. The same number gives the same pair, whatever was drawn before.
-pub struct PairSource {
+pub struct TrainingPairs {
     shapes: Box<dyn ShapeSource>,
     training: Vec<usize>,
     validation: Vec<usize>,
@@ -44,7 +44,7 @@ pub struct PairSource {
     pairs: PairConfig,
 }
 
-impl PairSource {
+impl TrainingPairs {
     /// Splits `shapes` into a training and a validation part (every n-th shape).
     pub fn new(config: &TrainConfig, shapes: Box<dyn ShapeSource>) -> Self {
         let (count, held_out) = (shapes.len(), config.data.validation.min(shapes.len() / 2).max(1));
@@ -58,7 +58,7 @@ impl PairSource {
     }
 
     /// Number of training shapes, the length of an epoch in pairs.
-    pub fn len(&self) -> usize {
+    pub fn epoch_length(&self) -> usize {
         self.training.len()
     }
 
@@ -89,7 +89,7 @@ impl PairSource {
         let mut order = (usize::MAX, Vec::new());
         (first..first + count)
             .map(|number| {
-                let (epoch, position) = (number / self.len(), number % self.len());
+                let (epoch, position) = (number / self.epoch_length(), number % self.epoch_length());
                 if order.0 != epoch {
                     order = (epoch, self.order(epoch));
                 }

@@ -16,7 +16,7 @@ use srrf_model::{Srrf, init};
 
 use crate::checkpoint::{self, CheckpointError, Progress};
 use crate::config::{OptimizerConfig, OptimizerKind, TrainConfig};
-use crate::data::PairSource;
+use crate::data::TrainingPairs;
 use crate::log::{Log, progress_bar};
 use crate::resources::cpu_seconds;
 use crate::schedule::Plan;
@@ -134,7 +134,7 @@ struct Run<'a> {
     config: &'a TrainConfig,
     options: &'a RunOptions,
     device: Device,
-    pairs: PairSource,
+    pairs: TrainingPairs,
     held_out: Vec<Pair>,
     workers: Workers,
     plan: Plan,
@@ -233,10 +233,10 @@ impl<'a> Run<'a> {
         let text = toml::to_string(config).map_err(|e| io(&path, std::io::Error::other(e)))?;
         write_atomically(&path, text.as_bytes())?;
 
-        let pairs = PairSource::new(config, shapes);
+        let pairs = TrainingPairs::new(config, shapes);
         let severity = Severity::try_from(config.keep.validate_severity).unwrap_or(Severity::ALL[2]);
         let held_out = pairs.validation(severity).map_err(StepError::from)?;
-        let plan = Plan::new(config, pairs.len());
+        let plan = Plan::new(config, pairs.epoch_length());
         let log = Log::open(folder, progress.step).map_err(|e| io(folder, e))?;
         let workers = Workers::new(options.threads)?;
         let started = (Instant::now(), progress.wall_seconds, cpu_seconds(), progress.cpu_seconds);

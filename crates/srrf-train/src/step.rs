@@ -18,7 +18,7 @@ use srrf_model::{
 };
 
 use crate::config::{LossConfig, SemTraining, StageConfig};
-use crate::data::PairSource;
+use crate::data::TrainingPairs;
 
 /// Named means over the pairs of a batch.
 pub type Losses = BTreeMap<&'static str, f64>;
@@ -32,7 +32,7 @@ pub struct StepContext<'a> {
     /// The blend of the two poses.
     pub integration: &'a IntegrationConfig,
     /// The pairs.
-    pub pairs: &'a PairSource,
+    pub pairs: &'a TrainingPairs,
     /// Device of the network, without autodiff.
     pub device: &'a Device,
     /// Pairs a step, and pairs a shard.
