@@ -15,7 +15,7 @@ use srrf_model::weights::{to_safetensors, write_atomically};
 use srrf_model::{Srrf, init};
 
 use crate::checkpoint::{self, CheckpointError, Progress};
-use crate::config::{OptimizerConfig, OptimizerKind, TrainConfig};
+use crate::config::{DataSource, OptimizerConfig, OptimizerKind, TrainConfig};
 use crate::data::TrainingPairs;
 use crate::log::{Log, progress_bar};
 use crate::resources::cpu_seconds;
@@ -319,7 +319,7 @@ impl<'a> Run<'a> {
     fn export(&self, file: &str, validation: Option<&Validation>) -> Result<(), RunError> {
         let (start, wall, cpu_start, cpu) = self.started;
         let mut notes = BTreeMap::from([
-            ("data".to_string(), self.pairs.description()),
+            ("data".to_string(), self.data_note()),
             ("seed".to_string(), self.config.seed.to_string()),
             ("steps".to_string(), self.progress.step.to_string()),
             ("pairs".to_string(), (self.progress.step * self.config.optimizer.batch).to_string()),
@@ -335,6 +335,16 @@ impl<'a> Run<'a> {
         let bytes = to_safetensors(&self.model, &self.config.network, &self.config.name, &notes)?;
         write_atomically(&self.options.folder.join(file), &bytes)?;
         Ok(())
+    }
+
+    /// What the weights were trained on; no path, for weights travel.
+    fn data_note(&self) -> String {
+        let (train, held_out) = (self.pairs.epoch_length(), self.held_out.len());
+        let what = match self.config.data.source {
+            DataSource::Modelnet => "ModelNet40, training split".to_string(),
+            DataSource::Shapes => format!("procedural shapes of seed {}", self.config.seed),
+        };
+        format!("{what}: {train} shapes to train, {held_out} to validate")
     }
 
     fn io(&self, source: std::io::Error) -> RunError {
