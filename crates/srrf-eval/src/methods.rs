@@ -16,7 +16,8 @@ pub const ORACLE: &str = "oracle";
 /// What the entries of the registry may need to set up a method.
 #[derive(Debug, Clone, Default)]
 pub struct MethodContext {
-    /// `--weights`: a file of trained weights; `None` for those in the program.
+    /// `--weights`: a file of trained weights, or the name of a model in the program; `None` for its
+    /// default.
     pub weights: Option<PathBuf>,
     /// `--device`: where tensors live, such as `flex`.
     pub device: String,
@@ -73,7 +74,10 @@ fn plain(register: impl Register + 'static) -> Method {
 fn srrf(context: &MethodContext) -> Result<Method, String> {
     let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
     let (loaded, origin) = match &context.weights {
-        Some(path) => (weights::load(path, &device), path.display().to_string()),
+        Some(path) => match path.to_str().and_then(|name| embedded::load(name, &device)) {
+            Some(loaded) => (loaded, "in the program".to_owned()),
+            None => (weights::load(path, &device), path.display().to_string()),
+        },
         None => (embedded::load_default(&device), "in the program".to_owned()),
     };
     let loaded = loaded.map_err(|e| e.to_string())?;

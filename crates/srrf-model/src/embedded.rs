@@ -13,7 +13,8 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     EMBEDDED.iter().map(|(name, _)| *name)
 }
 
-/// An embedded model by name. `None` if there is no model of that name.
+/// An embedded model by name: `srrf-small` (trained on ModelNet40, the default) or `srrf-shapes`
+/// (trained on the built-in shapes). `None` if there is no model of that name.
 pub fn load(name: &str, device: &Device) -> Option<Result<LoadedModel, WeightsError>> {
     let (name, bytes) = EMBEDDED.iter().find(|(known, _)| *known == name)?;
     Some(from_safetensors(bytes, &format!("embedded weights {name}"), device))
