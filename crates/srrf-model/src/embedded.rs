@@ -6,7 +6,10 @@ use crate::weights::{LoadedModel, WeightsError, from_safetensors};
 
 /// Names of the embedded models with their files; the model cards lie beside them in `weights/`.
 /// The first is the default.
-const EMBEDDED: &[(&str, &[u8])] = &[("srrf-small", include_bytes!("../weights/srrf-small.safetensors"))];
+const EMBEDDED: &[(&str, &[u8])] = &[
+    ("srrf-small", include_bytes!("../weights/srrf-small.safetensors")),
+    ("srrf-shapes", include_bytes!("../weights/srrf-shapes.safetensors")),
+];
 
 /// Names of the embedded models, the default first.
 pub fn names() -> impl Iterator<Item = &'static str> {
@@ -40,6 +43,7 @@ mod tests {
         for name in names() {
             assert_eq!(load(name, &device).unwrap().unwrap().name, name);
         }
+        assert_eq!(names().count(), 2);
         assert!(load("srrf-large", &device).is_none());
         assert_eq!(load_default(&device).unwrap().name, "srrf-small");
     }
