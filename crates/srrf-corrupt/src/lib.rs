@@ -22,6 +22,7 @@
 //! ```
 
 mod corruption;
+pub mod crop;
 pub mod corruptions;
 mod kind;
 mod normalize;

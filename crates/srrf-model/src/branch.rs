@@ -5,11 +5,12 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
+use crate::confidence::Confidence;
 use crate::geometry::{HostClouds, even_subsample, flat_indices, rows};
 use crate::integration::BranchPose;
 use crate::matching::SoftMatching;
 use crate::pfi::{Pfi, PfiConfig};
-use crate::procrustes::procrustes;
+use crate::procrustes::{procrustes, weighted_procrustes};
 use crate::sfe::{Sfe, SfeConfig};
 
 /// Sizes of one branch.
@@ -19,6 +20,9 @@ pub struct BranchConfig {
     /// Points of each cloud that carry features; 0 for all, as in the paper. Attention costs the
     /// square of it. The others still serve as neighbours in the first LFI.
     pub tokens: usize,
+    /// Whether source points count in the SVD head by a learned confidence; the paper: no.
+    #[serde(default)]
+    pub confidence: bool,
     /// The structural feature extractor.
     pub sfe: SfeConfig,
     /// The feature interaction.
@@ -32,6 +36,7 @@ impl BranchConfig {
             sfe: self.sfe.init(device),
             pfi: self.pfi.init(self.sfe.output_width(), device),
             matching: SoftMatching::new(device),
+            confidence: self.confidence.then(|| Confidence::new(self.sfe.output_width(), device)),
             tokens: self.tokens,
         }
     }
@@ -43,6 +48,7 @@ pub struct Branch {
     sfe: Sfe,
     pfi: Pfi,
     matching: SoftMatching,
+    confidence: Option<Confidence>,
     tokens: usize,
 }
 
@@ -96,7 +102,11 @@ impl Branch {
         let half = |x: &Tensor<3>, which: usize| x.clone().narrow(0, which * batch, batch);
         let (source_points, target_points) = (half(&tokens, 0), half(&tokens, 1));
         let matches = self.matching.forward(half(&features, 0), half(&features, 1), target_points.clone());
-        let (rotation, translation) = procrustes(source_points.clone(), matches.points.clone());
+        let confidence = self.confidence.as_ref().map(|c| c.forward(half(&features, 0)));
+        let (rotation, translation) = match confidence {
+            Some(weights) => weighted_procrustes(source_points.clone(), matches.points.clone(), weights),
+            None => procrustes(source_points.clone(), matches.points.clone()),
+        };
         BranchOutput {
             rotation,
             translation,

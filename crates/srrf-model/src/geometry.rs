@@ -55,15 +55,19 @@ pub fn flat_indices<'a>(
     out
 }
 
-/// The `k` nearest points of `support` for each of `queries`, nearest first, ties by index:
-/// `queries * k` indices. Where the support has fewer than `k` points they are repeated in turn.
+/// The `k` nearest distinct points of `support` for each of `queries`, nearest first, ties by
+/// index: `queries * k` indices. Of points at the same place only the first counts, since clouds
+/// filled up by repeats (as the corruptions that remove points leave them) would otherwise have
+/// neighbourhoods of half the size. Where there are fewer than `k` they are repeated in turn.
 pub fn k_nearest(queries: &[[f32; 3]], support: &[[f32; 3]], k: usize) -> Vec<u32> {
+    let kept = distinct(support);
+    let support: Vec<[f32; 3]> = kept.iter().map(|&i| support[i as usize]).collect();
     let found = k.min(support.len());
     let mut out = Vec::with_capacity(queries.len() * k);
     let mut best: Vec<(f32, u32)> = Vec::with_capacity(found + 1);
     let mut distances = vec![0.0_f32; support.len()];
     for query in queries {
-        for (d, p) in distances.iter_mut().zip(support) {
+        for (d, p) in distances.iter_mut().zip(&support) {
             *d = squared(query, p);
         }
         best.clear();
@@ -76,9 +80,19 @@ pub fn k_nearest(queries: &[[f32; 3]], support: &[[f32; 3]], k: usize) -> Vec<u3
                 worst = best.last().map_or(f32::INFINITY, |&(d, _)| d);
             }
         }
-        out.extend((0..k).map(|j| best[j % found].1));
+        out.extend((0..k).map(|j| kept[best[j % found].1 as usize]));
     }
     out
+}
+
+/// Indices of the points that are the first at their place, in order.
+fn distinct(points: &[[f32; 3]]) -> Vec<u32> {
+    let bits = |i: u32| points[i as usize].map(f32::to_bits);
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    order.sort_unstable_by_key(|&i| (bits(i), i));
+    order.dedup_by_key(|i| bits(*i));
+    order.sort_unstable();
+    order
 }
 
 /// The nearest point of `support` for each of `queries`: `queries` indices, ties to the first.
@@ -140,9 +154,11 @@ pub fn farthest_points(points: &[[f32; 3]], count: usize) -> Vec<u32> {
 
 /// `count` points evenly spaced along a Morton curve through the cloud, `phase` in [0, 1) steps
 /// from its start: a subsample as dense as the cloud itself, that no single outlier dominates (as
-/// it would farthest point sampling). Repeats in turn where the cloud has fewer points.
+/// it would farthest point sampling). Points at the same place count once. Repeats in turn where the
+/// cloud has fewer points.
 pub fn even_subsample(points: &[[f32; 3]], count: usize, phase: f32) -> Vec<u32> {
-    let n = points.len();
+    let kept = distinct(points);
+    let n = kept.len();
     let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for p in points {
         for c in 0..3 {
@@ -152,10 +168,12 @@ pub fn even_subsample(points: &[[f32; 3]], count: usize, phase: f32) -> Vec<u32>
     }
     let side = (0..3).map(|c| high[c] - low[c]).fold(f32::MIN_POSITIVE, f32::max);
     let cell = |v: f32, c: usize| (((v - low[c]) / side) * 1023.0) as u32;
-    let mut order: Vec<(u32, u32)> = points
+    let mut order: Vec<(u32, u32)> = kept
         .iter()
-        .enumerate()
-        .map(|(i, p)| (morton(cell(p[0], 0), cell(p[1], 1), cell(p[2], 2)), i as u32))
+        .map(|&i| {
+            let p = points[i as usize];
+            (morton(cell(p[0], 0), cell(p[1], 1), cell(p[2], 2)), i)
+        })
         .collect();
     // Ties in a cell are broken by the coordinates, so that the order of the points plays no part.
     order.sort_unstable_by(|a, b| {
@@ -217,6 +235,16 @@ mod tests {
         let first: Vec<u32> = found.chunks(5).map(|row| row[0]).collect();
         assert_eq!(first, nearest(&queries, &support));
         assert_eq!(k_nearest(&queries[..1], &support[..2], 5).len(), 5);
+    }
+
+    #[test]
+    fn repeated_points_count_once() {
+        let support = cloud(23);
+        let mut filled = support.clone();
+        filled.extend_from_slice(&support[..17]);
+        assert_eq!(k_nearest(&cloud(5), &filled, 6), k_nearest(&cloud(5), &support, 6));
+        assert_eq!(even_subsample(&filled, 9, 0.5), even_subsample(&support, 9, 0.5));
+        assert_eq!(k_nearest(&support[..1], &[support[0]; 4], 3), [0, 0, 0]);
     }
 
     #[test]

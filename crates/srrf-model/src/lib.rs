@@ -10,6 +10,7 @@
 pub mod attention;
 mod batch;
 mod branch;
+mod confidence;
 mod device;
 pub mod embedded;
 pub mod geometry;
@@ -36,7 +37,7 @@ pub use loss::{correspondence_loss, registration_loss};
 pub use matching::{SoftMatches, SoftMatching};
 pub use memory::keep_freed_memory;
 pub use pfi::{Pfi, PfiConfig};
-pub use procrustes::{nearest_rotation, procrustes, transform};
+pub use procrustes::{nearest_rotation, procrustes, transform, weighted_procrustes};
 pub use register::SrrfRegister;
 pub use sem::{LevelConfig, Sem, SemConfig, Skeleton, nearest_distance};
 pub use sem_loss::{SkeletonLoss, SkeletonLossConfig, chamfer, skeleton_loss, spread};

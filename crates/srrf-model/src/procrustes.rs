@@ -100,6 +100,27 @@ pub fn procrustes(source: Tensor<3>, target: Tensor<3>) -> (Tensor<3>, Tensor<2>
     (rotation, translation.squeeze_dim::<2>(1))
 }
 
+/// As [`procrustes`], where the points count by `weights`, which sum to 1 in each cloud. Differentiable
+/// in the weights too.
+///
+/// # Shapes
+/// - `source`, `target`: `[batch, points, 3]`, `weights`: `[batch, points, 1]`
+/// - output: rotation `[batch, 3, 3]` and translation `[batch, 3]`, `target ~ R source + t`
+pub fn weighted_procrustes(
+    source: Tensor<3>,
+    target: Tensor<3>,
+    weights: Tensor<3>,
+) -> (Tensor<3>, Tensor<2>) {
+    let [_, points, _] = weights.dims();
+    let source_mean = (source.clone() * weights.clone()).sum_dim(1); // [batch, 1, 3]
+    let target_mean = (target.clone() * weights.clone()).sum_dim(1);
+    let weighted = (target - target_mean.clone()) * weights * points as f64; // as many as unweighted
+    let cross = weighted.transpose().matmul(source - source_mean.clone());
+    let rotation = nearest_rotation(cross);
+    let translation = target_mean - source_mean.matmul(rotation.clone().transpose());
+    (rotation, translation.squeeze_dim::<2>(1))
+}
+
 /// `R p + t` for each point.
 ///
 /// # Shapes

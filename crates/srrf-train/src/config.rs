@@ -48,6 +48,10 @@ pub struct TrainConfig {
     pub name: String,
     /// Seed of the initial weights and of every draw.
     pub seed: u64,
+    /// Weights to start from: a file, or the name of a model in the program; random if not given.
+    /// Their network must have the sizes of this one.
+    #[serde(default)]
+    pub start: Option<String>,
     /// The shapes.
     pub data: DataConfig,
     /// How pairs are drawn.
@@ -80,6 +84,10 @@ pub struct DataConfig {
     /// Number of built-in shapes; unused for `modelnet`.
     #[serde(default = "default_shapes")]
     pub shapes: usize,
+    /// Share of the shards of a `modelnet` run that is made from built-in shapes instead, so that
+    /// the network sees surfaces of another world, and clouds that were sampled twice in full.
+    #[serde(default)]
+    pub built_in: f64,
     /// Shapes split off the training set for validation, spread over it. The test set is never
     /// looked at.
     pub validation: usize,
@@ -127,6 +135,17 @@ pub struct DrawConfig {
     pub turned: f64,
     /// Largest angle of such a pose, in degrees.
     pub turned_deg: f64,
+    /// Share of pairs that overlap in part only: each cloud keeps the part on one side of a plane,
+    /// after its corruption.
+    #[serde(default)]
+    pub cropped: f64,
+    /// Such a cloud keeps a share of its points between this and 1. RPMNet: 0.7.
+    #[serde(default = "default_crop_keep")]
+    pub crop_keep: f64,
+}
+
+fn default_crop_keep() -> f64 {
+    0.7
 }
 
 /// Weights of the losses.
@@ -275,6 +294,9 @@ impl TrainConfig {
             ("draw.residual", self.draw.residual),
             ("draw.independent", self.draw.independent),
             ("draw.turned", self.draw.turned),
+            ("draw.cropped", self.draw.cropped),
+            ("draw.crop_keep", self.draw.crop_keep),
+            ("data.built_in", self.data.built_in),
         ];
         if let Some((key, _)) = shares.iter().find(|(_, share)| !(0.0..=1.0).contains(share)) {
             return wrong(key, "must lie between 0 and 1");

@@ -5,8 +5,10 @@ use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
+use srrf_cloud::shapes::ProceduralShapes;
 use srrf_cloud::source::{ShapeSource, SourceError};
 use srrf_cloud::{PointCloud, Rigid};
+use srrf_corrupt::crop::{crop, random_direction};
 use srrf_corrupt::{
     CorruptionKind, Pair, PairConfig, PairError, PairSynthesizer, PoseDraw, Sampling, Severity,
     Stream as PairStream,
@@ -21,6 +23,8 @@ enum Stream {
     Training = 2,
     Validation = 3,
     Shard = 4,
+    Crop = 5,
+    BuiltIn = 6,
 }
 
 /// A generator for item `item` of `stream`.
@@ -36,6 +40,7 @@ fn generator(seed: u64, stream: Stream, item: u64) -> ChaCha8Rng {
 /// The pairs of a run. The same number gives the same pair, whatever was drawn before.
 pub struct TrainingPairs {
     shapes: Box<dyn ShapeSource>,
+    built_in: Option<(ProceduralShapes, f64)>,
     training: Vec<usize>,
     validation: Vec<usize>,
     draw: DrawConfig,
@@ -46,7 +51,10 @@ pub struct TrainingPairs {
 
 impl TrainingPairs {
     /// Splits `shapes` into a training and a validation part (every n-th shape).
-    pub fn new(config: &TrainConfig, shapes: Box<dyn ShapeSource>) -> Self {
+    ///
+    /// # Errors
+    /// [`PairError`] when the built-in shapes that `data.built_in` asks for cannot be made.
+    pub fn new(config: &TrainConfig, shapes: Box<dyn ShapeSource>) -> Result<Self, PairError> {
         let (count, held_out) = (shapes.len(), config.data.validation.min(shapes.len() / 2).max(1));
         let stride = count as f64 / held_out as f64;
         let validation: Vec<usize> = (0..held_out).map(|i| ((i as f64 + 0.5) * stride) as usize).collect();
@@ -54,7 +62,14 @@ impl TrainingPairs {
         let drawn = &config.draw.corruptions;
         let kinds = if drawn.is_empty() { CorruptionKind::ALL.to_vec() } else { drawn.clone() };
         let pairs = PairConfig { keep_correspondence: false, ..config.pairs };
-        Self { shapes, training, validation, draw: config.draw.clone(), kinds, seed: config.seed, pairs }
+        let built_in = match config.data.built_in {
+            share if share > 0.0 => {
+                Some((ProceduralShapes::new(config.seed, config.data.shapes, None)?, share))
+            }
+            _ => None,
+        };
+        let draw = config.draw.clone();
+        Ok(Self { shapes, built_in, training, validation, draw, kinds, seed: config.seed, pairs })
     }
 
     /// Number of training shapes, the length of an epoch in pairs.
@@ -84,8 +99,21 @@ impl TrainingPairs {
     /// # Errors
     /// [`PairError`] when a shape cannot be read or corrupted.
     pub fn shard(&self, first: usize, count: usize) -> Result<Vec<Pair>, PairError> {
-        let independent =
-            generator(self.seed, Stream::Shard, first as u64).random_bool(self.draw.independent);
+        let mut rng = generator(self.seed, Stream::Shard, first as u64);
+        let independent = rng.random_bool(self.draw.independent);
+        if let Some((shapes, share)) = &self.built_in
+            && rng.random_bool(*share)
+        {
+            return (first..first + count)
+                .map(|number| {
+                    let mut rng = generator(self.seed, Stream::BuiltIn, number as u64);
+                    let sampled = Sampled { shapes, independent, points: self.pairs.points };
+                    self.training_pair(sampled, rng.random_range(0..shapes.len()), number)
+                })
+                .collect();
+        }
+        let points = if independent { self.draw.independent_points } else { self.pairs.points };
+        let sampled = Sampled { shapes: self.shapes.as_ref(), independent, points };
         let mut order = (usize::MAX, Vec::new());
         (first..first + count)
             .map(|number| {
@@ -93,17 +121,16 @@ impl TrainingPairs {
                 if order.0 != epoch {
                     order = (epoch, self.order(epoch));
                 }
-                self.training_pair(order.1[position], number, independent)
+                self.training_pair(sampled, order.1[position], number)
             })
             .collect()
     }
 
-    fn training_pair(&self, shape: usize, number: usize, independent: bool) -> Result<Pair, PairError> {
+    fn training_pair(&self, sampled: Sampled, shape: usize, number: usize) -> Result<Pair, PairError> {
         let mut rng = generator(self.seed, Stream::Training, number as u64);
-        let mut pairs = self.pairs;
-        if independent {
+        let mut pairs = PairConfig { points: sampled.points, ..self.pairs };
+        if sampled.independent {
             pairs.sampling = Sampling::Independent;
-            pairs.points = self.draw.independent_points;
         }
         let corruption = if rng.random_bool(self.draw.clean) {
             None
@@ -121,12 +148,36 @@ impl TrainingPairs {
         };
         let stream = PairStream { seed: rng.random(), item: number as u64 };
         let synthesizer = PairSynthesizer::new(pairs)?;
-        if turned {
-            let shapes = Turned { shapes: self.shapes.as_ref(), rotation: random_pose(&mut rng, 180.0, 0.0) };
-            synthesizer.pair(&shapes, shape, corruption, pose, stream)
+        let mut pair = if turned {
+            let shapes = Turned { shapes: sampled.shapes, rotation: random_pose(&mut rng, 180.0, 0.0) };
+            synthesizer.pair(&shapes, shape, corruption, pose, stream)?
         } else {
-            synthesizer.pair(self.shapes.as_ref(), shape, corruption, pose, stream)
+            synthesizer.pair(sampled.shapes, shape, corruption, pose, stream)?
+        };
+        let mut rng = generator(self.seed, Stream::Crop, number as u64);
+        if self.draw.cropped > 0.0 && rng.random_bool(self.draw.cropped) {
+            self.crop(&mut pair, &mut rng)?;
         }
+        Ok(pair)
+    }
+
+    /// Cuts both clouds by a plane each, so that they overlap in part, and fills them up by repeats.
+    /// The two directions are less than a right angle apart, as those of two views of an object.
+    fn crop(&self, pair: &mut Pair, rng: &mut ChaCha8Rng) -> Result<(), PairError> {
+        let first = random_direction(rng);
+        let mut second = random_direction(rng);
+        if first.dot(&second) < 0.0 {
+            second = -second;
+        }
+        let second = pair.target_from_source.rotation * second;
+        for (cloud, direction) in [(&mut pair.source, first), (&mut pair.target, second)] {
+            let keep = self.draw.crop_keep + (1.0 - self.draw.crop_keep) * rng.random::<f64>();
+            let kept = crop(cloud.points(), &direction, keep);
+            let filled = kept.iter().copied().chain((kept.len()..cloud.len()).map(|i| kept[i % kept.len()]));
+            *cloud = PointCloud::new(filled.map(|i| cloud.points()[i]).collect())
+                .map_err(|source| PairError::Cloud { id: pair.id.clone(), source })?;
+        }
+        Ok(())
     }
 
     /// The validation pairs: each held-out shape once, the types in turn, clean among them.
@@ -147,6 +198,14 @@ impl TrainingPairs {
             })
             .collect()
     }
+}
+
+/// Where the clouds of a pair come from, and how they are sampled.
+#[derive(Clone, Copy)]
+struct Sampled<'a> {
+    shapes: &'a dyn ShapeSource,
+    independent: bool,
+    points: usize,
 }
 
 /// A turn about a random axis by up to `max_deg`, and a translation of up to `translation` along

@@ -11,8 +11,8 @@ use burn::optim::{AdamConfig, AdamWConfig, ModuleOptimizer};
 use burn::tensor::Device;
 use srrf_cloud::source::ShapeSource;
 use srrf_corrupt::{Pair, Severity};
-use srrf_model::weights::{to_safetensors, write_atomically};
-use srrf_model::{Srrf, init};
+use srrf_model::weights::{load as load_weights, parameters, to_safetensors, with_parameters, write_atomically};
+use srrf_model::{Srrf, embedded, init};
 
 use crate::checkpoint::{self, CheckpointError, Progress};
 use crate::config::{DataSource, OptimizerConfig, OptimizerKind, TrainConfig};
@@ -57,6 +57,17 @@ pub enum RunError {
     /// No thread could be started.
     #[error("no worker thread could be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The weights to start from are of another network.
+    #[error(
+        "start = \"{start}\": its `{name}` does not fit this network; make [network] as that of the weights, or \
+         leave `start` out"
+    )]
+    Start {
+        /// The first parameter that does not fit.
+        name: String,
+        /// The weights, as the configuration names them.
+        start: String,
+    },
     /// Losses or gradients stay non-finite.
     #[error(
         "the loss or its gradient was not finite in {0} steps in a row; the last checkpoint is from before. \
@@ -225,15 +236,18 @@ impl<'a> Run<'a> {
             }
             Some(found) => found,
             None => {
-                let model = init::seeded(config.network.init(&device), config.seed).valid();
-                (model, optimizer(&config.optimizer), Progress::default())
+                let model = match &config.start {
+                    Some(start) => starting_model(start, config, &device)?,
+                    None => init::seeded(config.network.init(&device), config.seed),
+                };
+                (model.valid(), optimizer(&config.optimizer), Progress::default())
             }
         };
         let path = folder.join("config.toml");
         let text = toml::to_string(config).map_err(|e| io(&path, std::io::Error::other(e)))?;
         write_atomically(&path, text.as_bytes())?;
 
-        let pairs = TrainingPairs::new(config, shapes);
+        let pairs = TrainingPairs::new(config, shapes).map_err(StepError::from)?;
         let severity = Severity::try_from(config.keep.validate_severity).unwrap_or(Severity::ALL[2]);
         let held_out = pairs.validation(severity).map_err(StepError::from)?;
         let plan = Plan::new(config, pairs.epoch_length());
@@ -350,6 +364,25 @@ impl<'a> Run<'a> {
     fn io(&self, source: std::io::Error) -> RunError {
         RunError::Io { path: self.options.folder.clone(), source }
     }
+}
+
+/// The weights that `start` of the configuration names.
+fn starting_model(start: &str, config: &TrainConfig, device: &Device) -> Result<Srrf, RunError> {
+    let loaded = match embedded::load(start, device) {
+        Some(loaded) => loaded?,
+        None => load_weights(Path::new(start), device)?,
+    };
+    // Parameters that only this network has keep their initial values.
+    let fresh = init::seeded(config.network.init(device), config.seed);
+    let mut values = parameters(&fresh);
+    for (name, theirs) in parameters(&loaded.model) {
+        match values.get_mut(&name) {
+            Some(ours) if ours.0 == theirs.0 => *ours = theirs,
+            _ => return Err(RunError::Start { start: start.to_string(), name }),
+        }
+    }
+    with_parameters(fresh, values)
+        .map_err(|(name, _)| RunError::Start { start: start.to_string(), name })
 }
 
 fn merge((sums, count): &mut (Losses, usize), losses: Losses) {
