@@ -1,0 +1,70 @@
+//! What the picture shows, in words.
+
+use crate::encode::{EncodedCloud, EncodedPair, EncodedPose};
+use crate::number::{count, significant, with_unit};
+
+/// A text alternative of the view.
+pub(crate) fn describe(pair: &EncodedPair) -> String {
+    let length = |value: f64| with_unit(&significant(value), &pair.unit);
+    let mut text = format!(
+        "Two point clouds: the source with {}, in orange, and the target with {}, in blue.",
+        points(&pair.source),
+        points(&pair.target)
+    );
+    let fit = |pose: &EncodedPose| {
+        pose.summary.map(|s| {
+            format!(
+                "half of the source's points lie within {} of a target point, nine in ten within {}",
+                length(s.median),
+                length(s.p90)
+            )
+        })
+    };
+    if let Some(fit) = fit(&pair.before) {
+        text += &format!(" Before registration ({}), {fit}.", pair.before.name);
+    }
+    for pose in &pair.poses {
+        text += &format!(
+            " The pose “{}” turns the source by {} degrees and moves its centre by {}",
+            pose.name,
+            significant(pose.turn_deg),
+            length(pose.shift)
+        );
+        match fit(pose) {
+            Some(fit) => text += &format!("; then {fit}."),
+            None => text += ".",
+        }
+    }
+    text
+}
+
+fn points(cloud: &EncodedCloud) -> String {
+    if cloud.shown < cloud.count {
+        format!("{} points ({} of {} shown)", count(cloud.count), count(cloud.shown), count(cloud.count))
+    } else {
+        format!("{} points", count(cloud.count))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use srrf_cloud::{PointCloud, Rigid};
+
+    use crate::encode::encode;
+    use crate::{Pair, Pose};
+
+    #[test]
+    fn says_what_the_picture_shows() {
+        let cloud =
+            PointCloud::new(vec![[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]])
+                .unwrap();
+        let mut pose = Rigid::identity();
+        pose.translation.x = 0.5;
+        let pair = Pair::new("p", &cloud, &cloud).pose(Pose::new("icp", pose)).unit("mm");
+        let text = encode(&pair, 1).description;
+        assert!(text.contains("4 points, in orange"), "{text}");
+        assert!(text.contains("(as given), half of the source's points lie within 0 mm"), "{text}");
+        assert!(text.contains("“icp” turns the source by 0 degrees and moves its centre by 0.5 mm"), "{text}");
+        assert!(text.ends_with("nine in ten within 0.5 mm."), "{text}");
+    }
+}

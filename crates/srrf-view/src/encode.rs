@@ -1,0 +1,210 @@
+//! A [`Pair`] as the data that the page's script reads.
+//!
+//! The script works in the target's axes with the origin at the centre of the target's bounding
+//! box, and each cloud comes relative to the centre of its own box, so that survey coordinates lose
+//! nothing on their way to the graphics card's single precision.
+
+use nalgebra::Vector3;
+use serde::Serialize;
+use srrf_cloud::{KnnIndex, PointCloud, Rigid};
+
+use crate::describe::describe;
+use crate::quantise::{QuantisedPoints, QuantisedValues, quantise_points, quantise_values};
+use crate::residual::{ResidualSummary, Residuals};
+use crate::sample::even_indices;
+use crate::{MATCHES_PER_PAIR, Match, Number, PAGE_BYTES, POINTS_PER_CLOUD, Pair, Pose, Skeleton, Up};
+
+#[derive(Debug, Serialize)]
+pub(crate) struct EncodedPair {
+    pub name: String,
+    pub unit: String,
+    pub up: &'static str,
+    pub source: EncodedCloud,
+    pub target: EncodedCloud,
+    pub before: EncodedPose,
+    pub poses: Vec<EncodedPose>,
+    pub skeletons: Option<[EncodedSkeleton; 2]>,
+    pub matches: Vec<EncodedMatch>,
+    pub match_count: usize,
+    pub numbers: Vec<Number>,
+    pub warnings: Vec<String>,
+    pub description: String,
+}
+
+#[derive(Debug, Serialize)]
+pub(crate) struct EncodedCloud {
+    /// Points of the cloud; `shown` of them are in `points`.
+    pub count: usize,
+    pub shown: usize,
+    #[serde(flatten)]
+    pub points: QuantisedPoints,
+}
+
+#[derive(Debug, Serialize)]
+pub(crate) struct EncodedPose {
+    pub name: String,
+    /// From the source's local frame to the view's, 3 rows of 4.
+    pub matrix: [f64; 12],
+    /// Angle and length of the motion from the pose before, the latter of the centre of the source.
+    pub turn_deg: f64,
+    pub shift: f64,
+    pub residual: Option<QuantisedValues>,
+    pub summary: Option<ResidualSummary>,
+    pub numbers: Vec<Number>,
+}
+
+#[derive(Debug, Serialize)]
+pub(crate) struct EncodedSkeleton {
+    pub points: Vec<[f32; 3]>,
+    pub radii: Vec<f32>,
+}
+
+#[derive(Debug, Serialize)]
+pub(crate) struct EncodedMatch {
+    pub source: [f32; 3],
+    pub target: [f32; 3],
+    pub weight: f32,
+}
+
+/// Encodes one of the `pairs` pairs of a page.
+pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
+    let mut warnings = pair.warnings.clone();
+    let (source_budget, target_budget) = budgets(pairs, pair.poses.len() + 1);
+    let (source, drawn) = encode_cloud(pair.source, source_budget);
+    let (target, _) = encode_cloud(pair.target, target_budget);
+    let index = KnnIndex::new(pair.target.points()).ok();
+    let frames = Frames { source: source.points.centre, target: target.points.centre };
+
+    let mut before = pair.before.clone();
+    if !is_finite(&before.target_from_source) {
+        warnings.push(format!("The pose “{}” is not finite; the clouds are shown as given.", before.name));
+        before = Pose::new("as given", Rigid::identity());
+    }
+    let encode_pose = |pose: &Pose| {
+        let residuals = index.as_ref().map(|i| Residuals::new(i, &drawn, &pose.target_from_source));
+        let centre = |p: &Pose| Vector3::from(p.target_from_source.apply(&frames.source));
+        EncodedPose {
+            name: pose.name.clone(),
+            matrix: frames.matrix(&pose.target_from_source),
+            turn_deg: pose.target_from_source.angle_to_deg(&before.target_from_source),
+            shift: (centre(pose) - centre(&before)).norm(),
+            residual: residuals.as_ref().map(|r| quantise_values(&r.values)),
+            summary: residuals.as_ref().map(|r| r.summary),
+            numbers: pose.numbers.clone(),
+        }
+    };
+    let mut poses = Vec::new();
+    for pose in &pair.poses {
+        if is_finite(&pose.target_from_source) {
+            poses.push(encode_pose(pose));
+        } else {
+            warnings.push(format!("The pose “{}” is not finite and cannot be shown.", pose.name));
+        }
+    }
+    let skeletons = pair.skeletons.as_ref().map(|[s, t]| {
+        [
+            encode_skeleton("source", s, &frames.source, &mut warnings),
+            encode_skeleton("target", t, &frames.target, &mut warnings),
+        ]
+    });
+    let mut encoded = EncodedPair {
+        name: pair.name.clone(),
+        unit: pair.unit.clone(),
+        up: match pair.up {
+            Up::Z => "z",
+            Up::Y => "y",
+        },
+        before: encode_pose(&before),
+        poses,
+        skeletons,
+        matches: encode_matches(&pair.matches, &frames),
+        match_count: pair.matches.len(),
+        numbers: pair.numbers.clone(),
+        warnings,
+        description: String::new(),
+        source,
+        target,
+    };
+    encoded.description = describe(&encoded);
+    encoded
+}
+
+/// Most points of the source and of the target in a page with so many pairs and poses a pair.
+///
+/// Half of a pair's share of [`PAGE_BYTES`] goes to each cloud: 6 bytes a point, and in the source
+/// 2 more for each pose's distance.
+fn budgets(pairs: usize, poses: usize) -> (usize, usize) {
+    let half = PAGE_BYTES / pairs.max(1) / 2;
+    ((half / (6 + 2 * poses)).min(POINTS_PER_CLOUD), (half / 6).min(POINTS_PER_CLOUD))
+}
+
+fn encode_cloud(cloud: &PointCloud, budget: usize) -> (EncodedCloud, Vec<[f64; 3]>) {
+    let drawn: Vec<[f64; 3]> =
+        even_indices(cloud.len(), budget).into_iter().map(|i| cloud.points()[i]).collect();
+    let points = quantise_points(drawn.iter().copied());
+    (EncodedCloud { count: cloud.len(), shown: drawn.len(), points }, drawn)
+}
+
+/// The origins of the local frames, in the coordinates of the clouds.
+struct Frames {
+    source: [f64; 3],
+    target: [f64; 3],
+}
+
+impl Frames {
+    /// `R (p + source) + t - target`, as 3 rows of 4.
+    fn matrix(&self, pose: &Rigid) -> [f64; 12] {
+        let shift = Vector3::from(pose.apply(&self.source)) - Vector3::from(self.target);
+        std::array::from_fn(|i| match i % 4 {
+            3 => shift[i / 4],
+            column => pose.rotation[(i / 4, column)],
+        })
+    }
+}
+
+fn encode_skeleton(
+    which: &str,
+    skeleton: &Skeleton,
+    centre: &[f64; 3],
+    warnings: &mut Vec<String>,
+) -> EncodedSkeleton {
+    let (points, radii) = (&skeleton.points, &skeleton.radii);
+    let usable = points.iter().flatten().chain(radii).all(|v| v.is_finite());
+    if !usable || (!radii.is_empty() && radii.len() != points.len()) {
+        warnings.push(format!(
+            "The skeleton of the {which} has numbers that are not finite, or radii for only some of its \
+             points; it is left out."
+        ));
+        return EncodedSkeleton { points: Vec::new(), radii: Vec::new() };
+    }
+    EncodedSkeleton {
+        points: points.iter().map(|p| local(p, centre)).collect(),
+        radii: radii.iter().map(|&r| r as f32).collect(),
+    }
+}
+
+/// The strongest finite matches, strongest first; of equals those that came first.
+fn encode_matches(matches: &[Match], frames: &Frames) -> Vec<EncodedMatch> {
+    let finite =
+        |m: &&Match| m.source.iter().chain(&m.target).chain([&m.weight]).all(|value| value.is_finite());
+    let mut strongest: Vec<&Match> = matches.iter().filter(finite).collect();
+    strongest.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    strongest.truncate(MATCHES_PER_PAIR);
+    let encoded = strongest.into_iter().map(|m| EncodedMatch {
+        source: local(&m.source, &frames.source),
+        target: local(&m.target, &frames.target),
+        weight: m.weight as f32,
+    });
+    encoded.collect()
+}
+
+fn local(point: &[f64; 3], centre: &[f64; 3]) -> [f32; 3] {
+    std::array::from_fn(|axis| (point[axis] - centre[axis]) as f32)
+}
+
+fn is_finite(pose: &Rigid) -> bool {
+    pose.rotation.iter().chain(pose.translation.iter()).all(|v| v.is_finite())
+}
+
+#[cfg(test)]
+mod tests;

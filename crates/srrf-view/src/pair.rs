@@ -1,0 +1,194 @@
+//! [`Pair`]: two clouds and what was found between them.
+
+use srrf_cloud::{PointCloud, Registration, Rigid};
+
+use crate::Number;
+
+/// A pose to show, with its name and figures of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pose {
+    pub(crate) name: String,
+    pub(crate) target_from_source: Rigid,
+    pub(crate) numbers: Vec<Number>,
+}
+
+impl Pose {
+    /// `target ~ R source + t`, in the coordinates of the clouds.
+    pub fn new(name: impl Into<String>, target_from_source: Rigid) -> Self {
+        Self { name: name.into(), target_from_source, numbers: Vec::new() }
+    }
+
+    /// A figure of this pose, such as its error. Figures with the same label make one column of the
+    /// table of poses.
+    #[must_use]
+    pub fn number(mut self, number: Number) -> Self {
+        self.numbers.push(number);
+        self
+    }
+}
+
+/// A skeleton: spheres along the middle of a shape.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Skeleton {
+    /// Centres in the coordinates of their cloud, shape `[s, 3]`.
+    pub points: Vec<[f64; 3]>,
+    /// Radii in the unit of the clouds, shape `[s]`; empty if they are not known, which draws small
+    /// spheres.
+    pub radii: Vec<f64>,
+}
+
+/// A soft match: a point of the source and where the method expects it in the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Match {
+    /// In source coordinates.
+    pub source: [f64; 3],
+    /// In target coordinates.
+    pub target: [f64; 3],
+    /// Not negative; the greater, the stronger.
+    pub weight: f64,
+}
+
+/// Which axis points up on the screen at first. The reader can change it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Up {
+    /// As scanners and surveys have it.
+    #[default]
+    Z,
+    /// As most meshes have it, ModelNet40's HDF5 files among them.
+    Y,
+}
+
+/// Two clouds, the poses found between them, and whatever else is worth seeing.
+#[derive(Debug, Clone)]
+pub struct Pair<'a> {
+    pub(crate) name: String,
+    pub(crate) source: &'a PointCloud,
+    pub(crate) target: &'a PointCloud,
+    pub(crate) before: Pose,
+    pub(crate) poses: Vec<Pose>,
+    pub(crate) skeletons: Option<[Skeleton; 2]>,
+    pub(crate) matches: Vec<Match>,
+    pub(crate) numbers: Vec<Number>,
+    pub(crate) warnings: Vec<String>,
+    pub(crate) unit: String,
+    pub(crate) up: Up,
+}
+
+impl<'a> Pair<'a> {
+    /// A pair whose pose before any registration is the identity.
+    pub fn new(name: impl Into<String>, source: &'a PointCloud, target: &'a PointCloud) -> Self {
+        Self {
+            name: name.into(),
+            source,
+            target,
+            before: Pose::new("as given", Rigid::identity()),
+            poses: Vec::new(),
+            skeletons: None,
+            matches: Vec::new(),
+            numbers: Vec::new(),
+            warnings: Vec::new(),
+            unit: String::new(),
+            up: Up::default(),
+        }
+    }
+
+    /// The pose before registration, instead of the identity.
+    #[must_use]
+    pub fn before(mut self, pose: Pose) -> Self {
+        self.before = pose;
+        self
+    }
+
+    /// A pose that was found. The first is shown when the page opens: add the result first, then
+    /// branches, starts or other methods.
+    #[must_use]
+    pub fn pose(mut self, pose: Pose) -> Self {
+        self.poses.push(pose);
+        self
+    }
+
+    /// The answer of a method: its pose under the name `result`, its branches under theirs, and its
+    /// skeletons (without radii).
+    #[must_use]
+    pub fn registration(mut self, registration: &Registration) -> Self {
+        self.poses.push(Pose::new("result", registration.target_from_source));
+        self.poses.extend(registration.branches.iter().map(|branch| {
+            Pose::new(branch.name, branch.target_from_source).number(
+                Number::new("Inlier ratio", branch.inlier_ratio)
+                    .help("share of the branch's correspondences that agree with its pose"),
+            )
+        }));
+        match &registration.skeletons {
+            Some(both) => {
+                let skeleton = |points: &[[f64; 3]]| Skeleton { points: points.to_vec(), radii: Vec::new() };
+                self.skeletons(skeleton(&both.source), skeleton(&both.target))
+            }
+            None => self,
+        }
+    }
+
+    /// The skeletons of the two clouds, each in the coordinates of its cloud.
+    #[must_use]
+    pub fn skeletons(mut self, source: Skeleton, target: Skeleton) -> Self {
+        self.skeletons = Some([source, target]);
+        self
+    }
+
+    /// Matches, in any order; the [`crate::MATCHES_PER_PAIR`] strongest are drawn.
+    #[must_use]
+    pub fn matches(mut self, matches: impl IntoIterator<Item = Match>) -> Self {
+        self.matches.extend(matches);
+        self
+    }
+
+    /// A figure beside the view.
+    #[must_use]
+    pub fn number(mut self, number: Number) -> Self {
+        self.numbers.push(number);
+        self
+    }
+
+    /// A warning above the figures, one sentence.
+    #[must_use]
+    pub fn warning(mut self, warning: impl Into<String>) -> Self {
+        self.warnings.push(warning.into());
+        self
+    }
+
+    /// The unit of the coordinates, such as `m`. Without it lengths are shown as bare numbers.
+    #[must_use]
+    pub fn unit(mut self, unit: impl Into<String>) -> Self {
+        self.unit = unit.into();
+        self
+    }
+
+    /// Which axis points up on the screen.
+    #[must_use]
+    pub fn up(mut self, up: Up) -> Self {
+        self.up = up;
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use srrf_cloud::{Branch, Skeletons};
+
+    use super::*;
+
+    #[test]
+    fn a_registration_brings_its_branches_and_skeletons() {
+        let cloud = PointCloud::new(vec![[0.0; 3]]).unwrap();
+        let mut answer = Registration::from_pose(Rigid::identity());
+        answer.branches.push(Branch {
+            name: "dense",
+            target_from_source: Rigid::identity(),
+            inlier_ratio: 0.25,
+        });
+        answer.skeletons = Some(Skeletons { source: vec![[1.0; 3]], target: vec![[2.0; 3], [3.0; 3]] });
+        let pair = Pair::new("a", &cloud, &cloud).registration(&answer);
+        assert_eq!(pair.poses.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), ["result", "dense"]);
+        assert_eq!(pair.poses[1].numbers[0].value, "0.25");
+        assert_eq!(pair.skeletons.unwrap().map(|s| s.points.len()), [1, 2]);
+    }
+}
