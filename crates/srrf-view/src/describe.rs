@@ -55,16 +55,18 @@ mod tests {
 
     #[test]
     fn says_what_the_picture_shows() {
-        let cloud =
-            PointCloud::new(vec![[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]])
-                .unwrap();
+        let cloud = PointCloud::new(vec![[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]])
+            .unwrap();
         let mut pose = Rigid::identity();
         pose.translation.x = 0.5;
         let pair = Pair::new("p", &cloud, &cloud).pose(Pose::new("icp", pose)).unit("mm");
         let text = encode(&pair, 1).description;
         assert!(text.contains("4 points, in orange"), "{text}");
         assert!(text.contains("(as given), half of the source's points lie within 0 mm"), "{text}");
-        assert!(text.contains("“icp” turns the source by 0 degrees and moves its centre by 0.5 mm"), "{text}");
+        assert!(
+            text.contains("“icp” turns the source by 0 degrees and moves its centre by 0.5 mm"),
+            "{text}"
+        );
         assert!(text.ends_with("nine in ten within 0.5 mm."), "{text}");
     }
 }

@@ -28,7 +28,8 @@ pub struct Page<'a> {
 }
 
 /// Refuses every request, so that a page cannot reach the network whatever it contains.
-const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
+const POLICY: &str =
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
 
 const STYLE: &str = "html,body{margin:0;height:100%}body{display:flex;flex-direction:column;font:15px/1.45 \
     system-ui,sans-serif;background:#fff;color:#1b1f24;--sv-height:100%}header{padding:.6rem 1rem;border-bottom:1px \

@@ -127,11 +127,11 @@ async function everythingOnOnePage(browser) {
   assert.equal(await page.$eval('.sv-bar select', (e) => e.value), '0');
 
   await changes(page, 'colour by distance', () => page.click('input[value=residual]'));
-  assert.match(await page.$eval('.sv-legend', (e) => e.textContent), /Distance to the target \(after, result\)/);
+  assert.match(await page.$eval('.sv-legend', (e) => e.textContent), /Distance to the target \(after: result\)/);
   await changes(page, 'the range of the colours', () => setRange(page, '.sv-side fieldset input[step="0.005"]', 0.2));
   await page.select('.sv-bar select', '1');
   await shot(page, '4-distance');
-  await changes(page, 'the size of the points', () => setRange(page, '.sv-side input[max="10"]', 8));
+  await changes(page, 'the size of the points', () => setRange(page, '.sv-side input[max="10"]', 9));
   await setRange(page, '.sv-side input[max="10"]', 4);
   await page.click('input[value=cloud]');
   for (const layer of ['skeletons', 'matches', 'ghost']) await page.click(`.sv-check input[name=${layer}]`);
@@ -183,8 +183,11 @@ async function severalPairs(browser) {
   assert.equal(await page.$$eval('.sv-side select', (all) => all[0].options.length), 4);
   await changes(page, 'another pair', () => page.select('.sv-side select', '1'));
   await shot(page, '9-gallery');
+  await page.emulateMediaFeatures([{ name: 'prefers-color-scheme', value: 'dark' }]);
   await page.select('.sv-side select', '3');
-  await shot(page, '9-gallery-dark', {});
+  await page.click('.sv-check input[name=matches]');
+  await setRange(page, '.sv-slide input', 0.5);
+  await shot(page, '9-gallery-dark');
   assert.deepEqual(complaints, []);
   await page.close();
 }
@@ -221,11 +224,13 @@ async function farApart(browser) {
 
 async function withoutWebgl() {
   const browser = await launch('--disable-3d-apis');
-  const { page } = await open(browser, 'one.html', { width: 900 });
+  const { page, complaints } = await open(browser, 'one.html', { width: 900 });
   await page.waitForSelector('.sv-fault');
   assert.match(await page.$eval('.sv-fault', (e) => e.textContent), /WebGL 2 is missing or switched off/);
   assert.ok((await page.$$('.sv-side tbody tr')).length > 1, 'the figures are there');
+  assert.equal(await page.$eval('.sv-bar', (e) => e.hidden), true);
   await page.screenshot({ path: path.join(folder, '12-no-webgl.png') });
+  assert.deepEqual(complaints, []);
   await browser.close();
 }
 

@@ -52,37 +52,36 @@ function quantile(values, q) {
   return sorted[Math.min(sorted.length - 1, Math.floor(q * sorted.length))] ?? 0;
 }
 
-/** Centre and radius of most of the points: a few strays do not make everything small. */
-function ball(position, matrix) {
-  const step = Math.max(1, Math.floor(position.length / 3 / 4000));
+/** At most 3,000 of the points, spread over the list. */
+function some(position) {
+  const step = 3 * Math.max(1, Math.floor(position.length / 9000));
   const points = [];
-  for (let i = 0; i < position.length; i += 3 * step) points.push(new Vector3().fromArray(position, i));
-  if (matrix) for (const p of points) p.applyMatrix4(matrix);
-  const axes = ['x', 'y', 'z'];
-  const centre = new Vector3(
-    ...axes.map((axis) => {
-      const values = points.map((p) => p[axis]);
-      return (quantile(values, 0.02) + quantile(values, 0.98)) / 2;
-    }),
-  );
+  for (let i = 0; i < position.length; i += step) points.push(new Vector3().fromArray(position, i));
+  return points;
+}
+
+/** Centre and radius of most of the points: a few strays do not make everything small. */
+function ball(points) {
+  const middle = (axis) => {
+    const values = points.map((p) => p[axis]);
+    return (quantile(values, 0.02) + quantile(values, 0.98)) / 2;
+  };
+  const centre = new Vector3(middle('x'), middle('y'), middle('z'));
   return { centre, radius: quantile(points.map((p) => p.distanceTo(centre)), 0.98) };
 }
 
-/** The ball around several balls' boxes, good enough to point a camera at. */
+/** A ball that holds several balls. */
 function around(balls) {
-  const low = new Vector3(Infinity, Infinity, Infinity);
-  const high = low.clone().negate();
-  for (const { centre, radius } of balls) {
-    low.min(centre.clone().subScalar(radius));
-    high.max(centre.clone().addScalar(radius));
-  }
-  const centre = low.clone().add(high).multiplyScalar(0.5);
+  const centre = new Vector3();
+  for (const b of balls) centre.addScaledVector(b.centre, 1 / balls.length);
   return { centre, radius: Math.max(...balls.map((b) => b.centre.distanceTo(centre) + b.radius), 1e-9) };
 }
 
 export class Scene {
   /** Throws where there is no WebGL 2. */
   constructor(canvas, onFrame) {
+    // Asked first, since three.js would complain on the console.
+    if (!document.createElement('canvas').getContext('webgl2')) throw new Error('no WebGL 2');
     this.canvas = canvas;
     this.onFrame = onFrame;
     this.renderer = new WebGLRenderer({ canvas, antialias: true });
@@ -136,7 +135,8 @@ export class Scene {
     this.source = this.cloud(this.positions.source);
     this.ghost = this.cloud(this.positions.source);
     this.ghost.matrix = matrixOf(pair.before.matrix);
-    this.balls = { source: ball(this.positions.source), target: ball(this.positions.target) };
+    this.samples = { source: some(this.positions.source), target: some(this.positions.target) };
+    this.balls = { source: ball(this.samples.source), target: ball(this.samples.target) };
     const found = matrixOf((pair.poses[0] ?? pair.before).matrix);
     this.radius = around([this.balls.target, this.moved(found)]).radius;
     this.skeletons = (pair.skeletons ?? []).map((skeleton) => this.skeleton(skeleton));
@@ -243,15 +243,35 @@ export class Scene {
    */
   fit(pose) {
     const placed = pose ? matrixOf(pose.matrix) : this.source.matrix;
-    const balls = [this.balls.target, this.moved(placed)];
-    const all = around([...balls, this.moved(this.ghost.matrix)]);
-    const { centre, radius } = (pose ? all.radius < 2 * this.radius : this.ghost.visible) ? all : around(balls);
+    const balls = [this.balls.target, this.moved(placed), this.moved(this.ghost.matrix)];
+    const before = pose ? around(balls).radius < 2 * this.radius : this.ghost.visible;
     this.axes.updateMatrixWorld();
-    this.controls.target.copy(centre.applyMatrix4(this.axes.matrixWorld));
-    const narrow = Math.min(1, this.camera.aspect);
-    const distance = (1.02 * radius) / Math.sin((this.camera.fov / 2) * (Math.PI / 180)) / narrow;
-    const direction = this.direction ?? new Vector3(0.55, 0.42, 1);
-    this.camera.position.copy(direction.clone().setLength(distance)).add(this.controls.target);
+    const shown = [...this.samples.target.map((p) => p.clone())];
+    for (const matrix of before ? [placed, this.ghost.matrix] : [placed]) {
+      shown.push(...this.samples.source.map((p) => p.clone().applyMatrix4(matrix)));
+    }
+    for (const p of shown) p.applyMatrix4(this.axes.matrixWorld);
+
+    // In the camera's directions, so that the picture is filled whatever the shape.
+    const back = this.camera.position.clone().sub(this.controls.target);
+    if (!this.framed || back.lengthSq() === 0) back.set(0.55, 0.42, 1);
+    this.framed = true;
+    back.normalize();
+    const right = new Vector3(0, 1, 0).cross(back).normalize();
+    const up = back.clone().cross(right);
+    const middle = (axis) => {
+      const values = shown.map((p) => p.dot(axis));
+      return axis.clone().multiplyScalar((quantile(values, 0.005) + quantile(values, 0.995)) / 2);
+    };
+    const centre = middle(right).add(middle(up)).add(middle(back));
+    const slope = Math.tan((this.camera.fov / 2) * (Math.PI / 180));
+    const away = shown.map((p) => {
+      const d = p.sub(centre);
+      return d.dot(back) + Math.max(Math.abs(d.dot(right)) / this.camera.aspect, Math.abs(d.dot(up))) / slope;
+    });
+    const distance = 1.12 * Math.max(quantile(away, 0.99), 1e-6 * this.radius);
+    this.controls.target.copy(centre);
+    this.camera.position.copy(centre).addScaledVector(back, distance);
     this.controls.update();
     this.invalidate();
   }

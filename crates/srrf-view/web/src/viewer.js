@@ -7,7 +7,7 @@ import { Scene } from './scene.js';
 
 const LAYERS = [
   ['ghost', 'Source before'],
-  ['source', 'Source after (follows the slider)'],
+  ['source', 'Source after'],
   ['target', 'Target'],
   ['skeletons', 'Skeletons'],
   ['matches', 'Matches'],
@@ -33,6 +33,7 @@ export class Viewer {
       this.scene = new Scene(this.canvas, () => this.drawn());
     } catch {
       this.stage.replaceChildren(make('p', { className: 'sv-fault', attributes: { role: 'alert' } }, NO_WEBGL));
+      this.bar.hidden = true;
       root.classList.add('sv-flat');
     }
     this.choosePair(0);
@@ -90,7 +91,7 @@ export class Viewer {
     this.scale = this.defaultScale();
     this.scene?.load(this.pair);
     this.scene?.orient(this.state.up);
-    this.pointSize = this.pair.source.shown + this.pair.target.shown < 12000 ? 4 : 2.5;
+    this.pointSize = (this.pair.source.shown + this.pair.target.shown < 12000 ? 4 : 2.5) * (innerWidth < 500 ? 0.65 : 1);
     this.scene?.setPointSize(this.pointSize);
     this.fill();
     this.refresh();
@@ -114,8 +115,11 @@ export class Viewer {
   }
 
   defaultScale() {
-    const [low, high] = this.scaleLimits();
-    return Math.min(high, 20 * low);
+    // Between the best pose and the start, so that good and bad poses differ, but near the best.
+    const [tenth, high] = this.scaleLimits();
+    const best = 10 * tenth;
+    const middle = Math.sqrt(best * (this.pair.before.summary?.p90 ?? best));
+    return Math.min(high, Math.max(2 * best, Math.min(middle, 10 * best)));
   }
 
   /** The parts that depend on the pair. */
@@ -217,7 +221,7 @@ export class Viewer {
   }
 
   viewSection() {
-    const size = range(1, 10, 0.5, this.pointSize, (pixels) => this.scene.setPointSize(pixels));
+    const size = range(1, 10, 0.1, this.pointSize, (pixels) => this.scene.setPointSize(pixels));
     const up = select(['Z', 'Y'], this.state.up === 'z' ? 0 : 1, (i) => {
       this.state.up = 'zy'[i];
       this.scene.orient(this.state.up);
@@ -304,7 +308,7 @@ export class Viewer {
   drawLegend(colours, residual) {
     const rows = [];
     const { layers } = this.state;
-    const at = this.pair.poses.length === 0 ? '' : this.end === this.pair.before ? ' before' : ` after, ${this.end.name}`;
+    const at = this.pair.poses.length === 0 ? '' : this.end === this.pair.before ? ' (before)' : ` (after: ${this.end.name})`;
     const entries = [
       ['source', !residual, `Source${at}`, 'source'], ['ghost', true, 'Source before', 'ghost'],
       ['target', true, 'Target', residual ? 'neutral' : 'target'], ['matches', true, 'Matches', 'match'],
@@ -315,7 +319,7 @@ export class Viewer {
       return make('span', { className: 'sv-entry' }, dot, text);
     };
     if (residual) {
-      const which = this.end === this.pair.before ? 'before' : `after, ${this.end.name}`;
+      const which = this.end === this.pair.before ? 'before' : `after: ${this.end.name}`;
       const bar = make('div', { className: 'sv-ramp' });
       bar.style.background = `linear-gradient(90deg, ${colours.ramp.map(css).join(',')})`;
       rows.push(make('p', {}, `Distance to the target (${which})`), bar,
