@@ -16,6 +16,7 @@ mod rigid;
 pub mod shapes;
 pub mod source;
 mod triangles;
+mod voxel;
 
 pub use cloud::{CloudError, PointCloud, UnitSphere};
 pub use euler::EulerXyz;
@@ -24,3 +25,4 @@ pub use neighbours::KnnIndex;
 pub use normals::estimate_normals;
 pub use register::{Branch, Register, RegisterError, Registration, Skeletons};
 pub use rigid::Rigid;
+pub use voxel::{VoxelError, point_spacing, spacing_of, voxel_downsample};

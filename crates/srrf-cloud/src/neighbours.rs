@@ -94,6 +94,26 @@ impl KnnIndex {
         neighbours
     }
 
+    /// The points within `radius` of `query` as `(index, squared distance)`, sorted as by
+    /// [`KnnIndex::k_nearest`]; of more than `most`, the nearest `most`.
+    pub fn within(&self, query: &[f64; 3], radius: f64, most: usize) -> Vec<(usize, f64)> {
+        let limit = radius * radius;
+        let mut found = match &self.tree {
+            Some(tree) if query.iter().all(|c| c.is_finite()) && limit.is_finite() => {
+                let near = tree.query(query).within::<SquaredEuclidean<f64>>(limit * (1.0 + EDGE));
+                near.unsorted().execute().iter().map(|f| self.with_distance(f.item as usize, query)).collect()
+            }
+            _ => self.scan(query, self.len()),
+        };
+        found.retain(|n| n.1 <= limit);
+        if found.len() > most && most > 0 {
+            found.select_nth_unstable_by(most - 1, by_distance);
+        }
+        found.truncate(most);
+        sort(&mut found);
+        found
+    }
+
     fn with_distance(&self, index: usize, query: &[f64; 3]) -> (usize, f64) {
         (index, squared_distance(&self.points[index], query))
     }
@@ -133,6 +153,13 @@ mod tests {
         for query in queries {
             let expected = index.scan(query, points.len());
             assert_eq!(index.nearest(query).1, expected[0].1);
+            for radius in [0.0, 0.2, 0.5, 3.0, f64::INFINITY] {
+                let inside: Vec<_> = expected.iter().copied().filter(|n| n.1 <= radius * radius).collect();
+                for most in [0, 1, 7, points.len()] {
+                    let found = index.within(query, radius, most);
+                    assert_eq!(found, inside[..most.min(inside.len())], "radius {radius}, most {most}");
+                }
+            }
             for k in [0, 1, 2, 5, 20, 33, 64, 200, points.len(), points.len() + 3] {
                 assert_eq!(index.k_nearest(query, k), expected[..k.min(points.len())], "k = {k}");
             }

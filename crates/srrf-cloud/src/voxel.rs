@@ -1,0 +1,163 @@
+//! Thinning by a grid of voxels, and the spacing of a cloud.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use crate::{CloudError, KnnIndex, PointCloud};
+
+/// Voxel indices up to here are exact in `f64`.
+const LARGEST_INDEX: f64 = 9.0e15;
+
+/// Clouds up to this size are measured at every point.
+const SPACING_SAMPLE: usize = 4096;
+
+/// Why a cloud could not be thinned.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum VoxelError {
+    /// The size is no length.
+    #[error("the voxel size is {0}: it must be a finite length above 0")]
+    Size(f64),
+    /// The cloud spans more voxels than can be counted.
+    #[error("voxels of {size} are too small for a cloud that spans {extent}: choose larger ones")]
+    TooFine {
+        /// The voxel size.
+        size: f64,
+        /// Longest side of the cloud's bounding box.
+        extent: f64,
+    },
+}
+
+/// The centroid of the points in each voxel of a grid with cubes of side `size` (unit of the
+/// cloud), ordered by the voxel's place along x, then y, then z.
+///
+/// The grid starts at the cloud's lowest corner, so that a shifted cloud gives shifted centroids.
+/// Sums are taken from that corner, which keeps the digits of clouds far from the origin, and in an
+/// order given by the coordinates, so that the answer does not depend on the order of the points.
+///
+/// # Errors
+/// [`VoxelError`] for a size that is not above 0, or far too small for the cloud.
+pub fn voxel_downsample(cloud: &PointCloud, size: f64) -> Result<PointCloud, VoxelError> {
+    if !size.is_finite() || size <= 0.0 {
+        return Err(VoxelError::Size(size));
+    }
+    let points = cloud.points();
+    let low: [f64; 3] = std::array::from_fn(|c| points.iter().map(|p| p[c]).fold(f64::INFINITY, f64::min));
+    let extent = points.iter().flat_map(|p| (0..3).map(|c| p[c] - low[c])).fold(0.0, f64::max);
+    if extent.is_nan() || extent / size > LARGEST_INDEX {
+        return Err(VoxelError::TooFine { size, extent });
+    }
+    let mut keyed: Vec<([i64; 3], [f64; 3])> = points
+        .iter()
+        .map(|p| {
+            let local: [f64; 3] = std::array::from_fn(|c| p[c] - low[c]);
+            (local.map(|c| (c / size).floor() as i64), local)
+        })
+        .collect();
+    keyed.par_sort_unstable_by(|(ka, a), (kb, b)| {
+        ka.cmp(kb).then(a[0].total_cmp(&b[0])).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]))
+    });
+    let centroids = keyed
+        .chunk_by(|a, b| a.0 == b.0)
+        .map(|voxel| {
+            let sum: Vector3<f64> = voxel.iter().map(|(_, p)| Vector3::from(*p)).sum();
+            (sum / voxel.len() as f64 + Vector3::from(low)).into()
+        })
+        .collect();
+    // Means of finite points that lie within one voxel are finite, and there is at least one.
+    PointCloud::new(centroids).map_err(|_| VoxelError::TooFine { size, extent })
+}
+
+/// Median distance from a point to the nearest point that does not coincide with it, unit of the
+/// points; 0 where all points coincide.
+///
+/// Up to 4,096 points every point is asked, of more every n-th. Points that coincide with 8 or more
+/// others have no say.
+///
+/// # Errors
+/// [`CloudError::Empty`] without points, [`CloudError::NotFinite`] at the first NaN or infinity.
+pub fn point_spacing(points: &[[f64; 3]]) -> Result<f64, CloudError> {
+    Ok(spacing_of(&KnnIndex::new(points)?))
+}
+
+/// [`point_spacing`] of points that are indexed already.
+pub fn spacing_of(index: &KnnIndex) -> f64 {
+    let step = index.len().div_ceil(SPACING_SAMPLE);
+    let nearest = |p: &[f64; 3]| {
+        // The first neighbour is the point itself; a second is nearly always enough.
+        let distinct = |k| index.k_nearest(p, k).into_iter().find(|n| n.1 > 0.0).map(|n| n.1);
+        distinct(2).or_else(|| distinct(9))
+    };
+    let sample: Vec<&[f64; 3]> = index.points().iter().step_by(step).collect();
+    let mut squared: Vec<f64> = sample.par_iter().filter_map(|p| nearest(p)).collect();
+    if squared.is_empty() {
+        return 0.0;
+    }
+    let middle = squared.len() / 2;
+    squared.select_nth_unstable_by(middle, f64::total_cmp).1.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+
+    fn cloud(n: usize) -> PointCloud {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        PointCloud::new((0..n).map(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0))).collect())
+            .unwrap()
+    }
+
+    #[test]
+    fn one_centroid_for_each_voxel() {
+        let points = vec![[0.0, 0.0, 0.0], [2.5, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 0.0, 1.5]];
+        let thin = voxel_downsample(&PointCloud::new(points).unwrap(), 1.0).unwrap();
+        assert_eq!(thin.points(), [[0.25, 0.25, 0.0], [0.0, 0.0, 1.5], [2.5, 0.0, 0.0]]);
+    }
+
+    #[test]
+    fn order_does_not_matter_and_weights_are_kept() {
+        let cloud = cloud(701);
+        let reversed = PointCloud::new(cloud.points().iter().rev().copied().collect()).unwrap();
+        let thin = voxel_downsample(&cloud, 0.3).unwrap();
+        assert_eq!(thin, voxel_downsample(&reversed, 0.3).unwrap());
+        assert!(thin.len() > 100 && thin.len() < 400);
+        assert_eq!(voxel_downsample(&cloud, 50.0).unwrap().len(), 1);
+        let whole = voxel_downsample(&cloud, 50.0).unwrap().points()[0];
+        assert!((Vector3::from(whole) - cloud.centroid()).norm() < 1e-12);
+    }
+
+    #[test]
+    fn far_from_the_origin() {
+        let far = |p: &[f64; 3]| [p[0] + 4e6, p[1] - 5e5, p[2]];
+        let near = cloud(503);
+        let moved = PointCloud::new(near.points().iter().map(far).collect()).unwrap();
+        let (a, b) = (voxel_downsample(&near, 0.25).unwrap(), voxel_downsample(&moved, 0.25).unwrap());
+        assert_eq!(a.len(), b.len());
+        for (p, q) in a.points().iter().zip(b.points()) {
+            assert!((Vector3::from(far(p)) - Vector3::from(*q)).norm() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn refuses_sizes_that_make_no_sense() {
+        for size in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(voxel_downsample(&cloud(5), size), Err(VoxelError::Size(_))));
+        }
+        assert!(matches!(voxel_downsample(&cloud(5), 1e-20), Err(VoxelError::TooFine { .. })));
+        let huge = PointCloud::new(vec![[-1e308; 3], [1e308; 3]]).unwrap();
+        assert!(voxel_downsample(&huge, 1.0).is_err());
+    }
+
+    #[test]
+    fn spacing_of_a_grid_with_repeats() {
+        let grid: Vec<[f64; 3]> =
+            (0..400).map(|i| [0.5 * f64::from(i % 20), 0.5 * f64::from(i / 20), 7.0]).collect();
+        assert!((point_spacing(&grid).unwrap() - 0.5).abs() < 1e-12);
+        let repeated = [grid.clone(), grid.clone(), vec![[3.0; 3]; 50]].concat();
+        assert!((point_spacing(&repeated).unwrap() - 0.5).abs() < 1e-12);
+        assert_eq!(point_spacing(&[[1.0; 3]; 30]).unwrap(), 0.0);
+        assert_eq!(point_spacing(&[]), Err(CloudError::Empty));
+    }
+}
