@@ -11,12 +11,16 @@ pub(crate) fn describe(pair: &EncodedPair) -> String {
         points(&pair.source),
         points(&pair.target)
     );
+    let within = |value: f64| match pair.distance_limit {
+        Some(limit) if value >= limit => format!("more than {}", length(limit)),
+        _ => length(value),
+    };
     let fit = |pose: &EncodedPose| {
         pose.summary.map(|s| {
             format!(
                 "half of the source's points lie within {} of a target point, nine in ten within {}",
-                length(s.median),
-                length(s.p90)
+                within(s.median),
+                within(s.p90)
             )
         })
     };

@@ -6,11 +6,11 @@
 
 use nalgebra::Vector3;
 use serde::Serialize;
-use srrf_cloud::{KnnIndex, PointCloud, Rigid};
+use srrf_cloud::{PointCloud, Rigid};
 
 use crate::describe::describe;
 use crate::quantise::{QuantisedPoints, QuantisedValues, quantise_points, quantise_values};
-use crate::residual::{ResidualSummary, Residuals};
+use crate::residual::{Distances, ResidualSummary, Residuals};
 use crate::sample::even_indices;
 use crate::{MATCHES_PER_PAIR, Match, Number, PAGE_BYTES, POINTS_PER_CLOUD, Pair, Pose, Skeleton, Up};
 
@@ -26,6 +26,8 @@ pub(crate) struct EncodedPair {
     pub skeletons: Option<[EncodedSkeleton; 2]>,
     pub matches: Vec<EncodedMatch>,
     pub match_count: usize,
+    /// Distances of this and more are given as this.
+    pub distance_limit: Option<f64>,
     pub numbers: Vec<Number>,
     pub warnings: Vec<String>,
     pub description: String,
@@ -72,7 +74,7 @@ pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
     let (source_budget, target_budget) = budgets(pairs, pair.poses.len() + 1);
     let (source, drawn) = encode_cloud(pair.source, source_budget);
     let (target, _) = encode_cloud(pair.target, target_budget);
-    let index = KnnIndex::new(pair.target.points()).ok();
+    let distances = Distances::new(pair.target).ok();
     let frames = Frames { source: source.points.centre, target: target.points.centre };
 
     let mut before = pair.before.clone();
@@ -81,7 +83,7 @@ pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
         before = Pose::new("as given", Rigid::identity());
     }
     let encode_pose = |pose: &Pose| {
-        let residuals = index.as_ref().map(|i| Residuals::new(i, &drawn, &pose.target_from_source));
+        let residuals = distances.as_ref().map(|d| Residuals::new(d, &drawn, &pose.target_from_source));
         let centre = |p: &Pose| Vector3::from(p.target_from_source.apply(&frames.source));
         EncodedPose {
             name: pose.name.clone(),
@@ -119,6 +121,7 @@ pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
         skeletons,
         matches: encode_matches(&pair.matches, &frames),
         match_count: pair.matches.len(),
+        distance_limit: distances.as_ref().and_then(Distances::limit),
         numbers: pair.numbers.clone(),
         warnings,
         description: String::new(),

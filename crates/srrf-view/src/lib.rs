@@ -27,7 +27,8 @@
 //! of many pairs) and the page says so. Coordinates are centred in `f64`, then stored with 16 bits
 //! per axis over the cloud's bounding box: a drawn point is off by at most half of 1/65535 of the
 //! box's edge along each axis. Distances are computed from the unrounded points against the whole
-//! target.
+//! target; in targets of more than 10,000 points those beyond a tenth of half the bounding box's
+//! diagonal are not told apart, and the page says so.
 //!
 //! What cannot be drawn (a pose with NaN, a skeleton with too few radii) is left out with a warning
 //! on the page, so one failed method does not cost a report.

@@ -2,6 +2,9 @@
 
 import { make, short, withUnit } from './dom.js';
 
+/** Whether a distance is known only to be at least so large. */
+export const isBeyond = (pair, x) => Boolean(pair.distance_limit) && x >= pair.distance_limit;
+
 /** Labels and values; the help is shown under them, since touch screens have no tooltips. */
 export function facts(numbers) {
   const rows = numbers.map(({ label, value, unit, help }) =>
@@ -27,7 +30,7 @@ export function poseTable(pair, chosen, choose) {
   const row = (pose, name, own) =>
     make('tr', { attributes: name.current ? { 'aria-current': 'true' } : {} }, make('th', { scope: 'row' }, name.node),
       ...labels.map(({ label }) => cell(own.find((n) => n.label === label)?.value ?? '–')),
-      cell(pose.summary ? short(pose.summary.median) : '–'), ...(motion ? [pose.turn_deg, pose.shift].map((x) => cell(short(x))) : []));
+      cell(pose.summary ? (isBeyond(pair, pose.summary.median) ? '≥ ' : '') + short(pose.summary.median) : '–'), ...(motion ? [pose.turn_deg, pose.shift].map((x) => cell(short(x))) : []));
   const rows = pair.poses.map((pose, i) => {
     const button = make('button', { type: 'button', attributes: { 'aria-pressed': String(i === chosen) },
       on: { click: () => choose(i) } }, pose.name);

@@ -2,7 +2,7 @@
 
 import { SCHEMES, css } from './colours.js';
 import { count, labelled, make, range, select, short, withUnit } from './dom.js';
-import { facts, poseTable } from './figures.js';
+import { facts, isBeyond, poseTable } from './figures.js';
 import { Scene } from './scene.js';
 
 const LAYERS = [
@@ -77,6 +77,11 @@ export class Viewer {
 
   length(x) {
     return withUnit(short(x), this.unit);
+  }
+
+  /** A distance to the target, which may be known only to be large. */
+  distance(x) {
+    return (isBeyond(this.pair, x) ? '≥ ' : '') + this.length(x);
   }
 
   choosePair(index) {
@@ -164,6 +169,7 @@ export class Viewer {
       KEYS,
       'This file needs no network. It contains three.js (MIT licence, its text is in the source of this page).',
     ];
+    if (this.pair.distance_limit) lines.splice(1, 0, `Distances over ${this.length(this.pair.distance_limit)} are not told apart.`);
     if (matches.length < all) lines.unshift(`The ${count(matches.length)} strongest of ${count(all)} matches are drawn.`);
     return lines;
   }
@@ -326,7 +332,7 @@ export class Viewer {
         make('p', { className: 'sv-ticks' }, make('span', {}, '0'), make('span', {}, this.length(this.scale / 2)),
           make('span', {}, `≥ ${this.length(this.scale)}`)));
       const { summary } = this.end;
-      if (summary) rows.push(make('p', { className: 'sv-muted' }, `median ${this.length(summary.median)}, 90 % under ${this.length(summary.p90)}`));
+      if (summary) rows.push(make('p', { className: 'sv-muted' }, `median ${this.distance(summary.median)}, 90 % within ${this.distance(summary.p90)}`));
     }
     rows.push(make('p', { className: 'sv-entries' }, ...entries.map(entry)));
     for (const [name, cloud] of [['source', this.pair.source], ['target', this.pair.target]]) {
