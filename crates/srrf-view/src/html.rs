@@ -13,7 +13,20 @@ struct ViewerData {
 /// The element in which [`crate::viewer_script`] shows `pairs`, with their data inside: one pair,
 /// or a list to choose from. Without JavaScript it shows the pairs in words.
 ///
-/// `id` must be unique in the page. Its height follows the custom property `--sv-height`.
+/// `id` must be unique in the page. The height follows the custom property `--sv-height`, by default
+/// `min(85vh, 46rem)`; on narrow screens the panel goes below the picture.
+///
+/// ```
+/// # use srrf_cloud::PointCloud;
+/// use srrf_view::{Pair, viewer_element, viewer_script};
+///
+/// # let cloud = PointCloud::new(vec![[0.0; 3], [1.0; 3]])?;
+/// let first = viewer_element("first", &[Pair::new("pair 1", &cloud, &cloud)]);
+/// let others = viewer_element("others", &[Pair::new("pair 2", &cloud, &cloud), Pair::new("pair 3", &cloud, &cloud)]);
+/// let body = format!("<h1>Report</h1>{first}<p>Others:</p>{others}<script>{}</script>", viewer_script());
+/// # assert!(body.len() > viewer_script().len());
+/// # Ok::<(), srrf_cloud::CloudError>(())
+/// ```
 pub fn viewer_element(id: &str, pairs: &[Pair<'_>]) -> String {
     let data = ViewerData { pairs: pairs.iter().map(|pair| encode(pair, pairs.len())).collect() };
     let words: String = data
