@@ -26,6 +26,17 @@ pub enum FormatError {
     /// The content cannot be understood, or is of a kind that is not supported.
     #[error("{0}")]
     Content(String),
+    /// The format cannot hold what is to be written.
+    #[error("{0}")]
+    Unwritable(String),
+}
+
+/// So that what reads and writes in one go has one kind of error; the way back is
+/// [`std::io::Error::downcast`].
+impl From<FormatError> for std::io::Error {
+    fn from(error: FormatError) -> Self {
+        Self::new(std::io::ErrorKind::InvalidData, error)
+    }
 }
 
 impl FormatError {
@@ -57,13 +68,37 @@ pub enum IoError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// The extension is none of the known ones.
-    #[error("{path:?}: the extension says no known format; known are {known}")]
+    /// Neither the name nor the content says a known format.
+    #[error("{path:?}: {fact}; known are {known}; name one of them, or convert the file")]
     UnknownFormat {
+        /// The file, or `-` for a stream.
+        path: PathBuf,
+        /// What was looked at.
+        fact: &'static str,
+        /// The known names and extensions.
+        known: String,
+    },
+    /// The format is known, but this build leaves it out.
+    #[error(
+        "{path:?}: this build has no {format}; build it with `--features {format}`, or convert the file to PLY"
+    )]
+    LeftOut {
         /// The file.
         path: PathBuf,
-        /// The known extensions.
-        known: String,
+        /// The format and the cargo feature, which have the same name.
+        format: &'static str,
+    },
+    /// The content is of another format than the one that was asked for.
+    #[error("{path:?}: not {asked} ({source}); its content is {found}: rename the file or name that format")]
+    OtherFormat {
+        /// The file.
+        path: PathBuf,
+        /// The format that the name or the caller says.
+        asked: &'static str,
+        /// The format of the content.
+        found: &'static str,
+        /// What was wrong when it was read as asked.
+        source: FormatError,
     },
     /// The content does not follow the format.
     #[error("{path:?}: {source}")]

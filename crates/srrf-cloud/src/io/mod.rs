@@ -1,27 +1,56 @@
-//! Clouds in files: PLY, XYZ/TXT/CSV/PTS text, NPY and OFF, chosen by extension.
+//! Clouds in files and streams: PLY, PCD, text (XYZ, TXT, CSV, PTS), NPY, NPZ, OBJ, OFF, STL, KITTI's
+//! `.bin`, and with the cargo features of these names LAS/LAZ (`las`) and E57 (`e57`).
 //!
-//! Each format is one file here and one line in [`FORMATS`].
+//! Each format is one module here and one line in [`FORMATS`]. The format of a file is chosen by its
+//! extension, and by its content where that says nothing ([`CloudFile`]). Coordinates are `f64`:
+//! what a file holds in single precision is read exactly, and what is written reads back as the same
+//! bits, but for the formats that hold less (KITTI, binary STL, LAS), which refuse to lose what
+//! matters or say in their documentation what they keep.
+//!
+//! The parsers trust no count of a file with memory: they take at most a small multiple of its
+//! size, and give an error, never a panic, for broken files. Fuzzers are in `fuzz/`.
 
-use std::fs;
+use std::io::Write;
 use std::path::Path;
 
-use crate::{CloudError, PointCloud};
+use crate::{PointCloud, Rigid};
 
 mod atomic;
+#[cfg(feature = "e57")]
+mod e57;
 mod error;
+mod file;
+mod kitti;
+#[cfg(feature = "las")]
+mod las;
 mod npy;
+mod npz;
+mod obj;
 pub(crate) mod off;
+mod pcd;
 mod ply;
+mod scalar;
+mod scan;
+mod single;
+mod stl;
 mod text;
 
 pub use atomic::write_atomically;
 pub use error::{FormatError, IoError};
+pub use file::{CloudFile, Kept, format_names};
 pub(crate) use text::parse_point;
 
 /// A file format for clouds.
 pub trait CloudFormat: Sync {
+    /// Its name, in lower case.
+    fn name(&self) -> &'static str;
+
     /// Extensions of its files, in lower case and without the dot.
     fn extensions(&self) -> &[&'static str];
+
+    /// Whether `bytes` begin as a file of this format does. The formats are asked in the order of
+    /// [`FORMATS`].
+    fn recognises(&self, bytes: &[u8]) -> bool;
 
     /// The points in the bytes of a file, in the order of the file; shape `[n, 3]`, any numbers.
     ///
@@ -32,27 +61,44 @@ pub trait CloudFormat: Sync {
     /// Writes the points, without loss.
     ///
     /// # Errors
-    /// Those of `out`.
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn std::io::Write) -> std::io::Result<()>;
+    /// Those of `out`; [`FormatError::Unwritable`] inside where the format cannot hold the points.
+    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> std::io::Result<()>;
+
+    /// Writes the file in `bytes` anew with its points moved by `motion` and its normals turned,
+    /// and all else as it is. Points with NaN or infinite coordinates stay where they are.
+    ///
+    /// # Errors
+    /// Those of `out`; inside them a [`FormatError`], of `bytes` or as for [`write`](Self::write).
+    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> std::io::Result<()>;
 }
 
-/// All formats.
-pub static FORMATS: &[&dyn CloudFormat] = &[&ply::Ply, &text::Text, &npy::Npy, &off::Off];
+/// All formats, the one that recognises almost anything last.
+pub static FORMATS: &[&dyn CloudFormat] = &[
+    &ply::Ply,
+    &pcd::Pcd,
+    &npy::Npy,
+    &npz::Npz,
+    &off::Off,
+    &obj::Obj,
+    &stl::Stl,
+    &kitti::Kitti,
+    #[cfg(feature = "las")]
+    &las::Las,
+    #[cfg(feature = "las")]
+    &las::Laz,
+    #[cfg(feature = "e57")]
+    &e57::E57,
+    &text::Text,
+];
 
-/// Reads the cloud in a file, of the format that its extension says. Only the points are read, in
-/// double precision; normals, colours and faces are passed over.
+/// Reads the cloud in a file, of the format that its extension or its content says. Only the points
+/// are read, in double precision; normals, colours and faces are passed over.
 ///
 /// # Errors
 /// [`IoError`], which names the file; among others [`IoError::NotFinite`] where there are NaN or
 /// infinite coordinates ([`read_cloud_dropping_nan`] leaves those points out).
 pub fn read_cloud(path: &Path) -> Result<PointCloud, IoError> {
-    let points = read_points(path)?;
-    let bad = |p: &[f64; 3]| !p.iter().all(|c| c.is_finite());
-    if let Some(first) = points.iter().position(bad) {
-        let count = points.iter().filter(|p| bad(p)).count();
-        return Err(IoError::NotFinite { path: path.to_owned(), count, total: points.len(), first });
-    }
-    PointCloud::new(points).map_err(|source| IoError::Cloud { path: path.to_owned(), source })
+    CloudFile::open(path)?.cloud()
 }
 
 /// As [`read_cloud`], but leaves out the points with NaN or infinite coordinates and says how many
@@ -61,46 +107,43 @@ pub fn read_cloud(path: &Path) -> Result<PointCloud, IoError> {
 /// # Errors
 /// [`IoError`]; also where no point is left.
 pub fn read_cloud_dropping_nan(path: &Path) -> Result<(PointCloud, usize), IoError> {
-    let mut points = read_points(path)?;
-    let before = points.len();
-    points.retain(|p| p.iter().all(|c| c.is_finite()));
-    let dropped = before - points.len();
-    let cloud = PointCloud::new(points).map_err(|source| IoError::Cloud { path: path.to_owned(), source })?;
-    Ok((cloud, dropped))
+    CloudFile::open(path)?.cloud_dropping_nan()
 }
 
 /// Writes a cloud in the format that the extension of `path` says, in double precision. The file
 /// appears whole or not at all.
 ///
 /// # Errors
-/// [`IoError::UnknownFormat`], [`IoError::Write`].
+/// [`IoError::UnknownFormat`], [`IoError::LeftOut`], [`IoError::Write`].
 pub fn write_cloud(path: &Path, cloud: &PointCloud) -> Result<(), IoError> {
-    let format = format_of(path)?;
+    let format = file::format_of(path)?;
     write_atomically(path, |out| format.write(cloud.points(), out))
         .map_err(|source| IoError::Write { path: path.to_owned(), source })
 }
 
+/// Writes a cloud to a stream in the format of this name or extension (such as `ply`).
+///
+/// # Errors
+/// As [`write_cloud`]; the stream is called `-`.
+pub fn write_cloud_to(out: &mut dyn Write, format: &str, cloud: &PointCloud) -> Result<(), IoError> {
+    let format = file::named(format)?;
+    let written = format.write(cloud.points(), out).and_then(|()| out.flush());
+    written.map_err(|source| IoError::Write { path: "-".into(), source })
+}
+
+/// Reads the file `input`, moves its points by `motion`, turns its normals and writes `output`: with
+/// all else unchanged if both are of one format ([`CloudFormat::rewrite`]), otherwise only the
+/// points. The file appears whole or not at all; it may replace `input`.
+///
+/// # Errors
+/// [`IoError`], which names the file.
+pub fn write_transformed(input: &Path, output: &Path, motion: &Rigid) -> Result<Kept, IoError> {
+    CloudFile::open(input)?.write_transformed(output, motion)
+}
+
 /// Whether the extension of `path` is that of a known format.
 pub fn is_cloud_file(path: &Path) -> bool {
-    format_of(path).is_ok()
-}
-
-fn read_points(path: &Path) -> Result<Vec<[f64; 3]>, IoError> {
-    let format = format_of(path)?;
-    let bytes = fs::read(path).map_err(|source| IoError::Read { path: path.to_owned(), source })?;
-    let points = format.read(&bytes).map_err(|source| IoError::Format { path: path.to_owned(), source })?;
-    if points.is_empty() {
-        return Err(IoError::Cloud { path: path.to_owned(), source: CloudError::Empty });
-    }
-    Ok(points)
-}
-
-fn format_of(path: &Path) -> Result<&'static dyn CloudFormat, IoError> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    FORMATS.iter().copied().find(|f| f.extensions().contains(&extension.as_str())).ok_or_else(|| {
-        let known: Vec<&str> = FORMATS.iter().flat_map(|f| f.extensions()).copied().collect();
-        IoError::UnknownFormat { path: path.to_owned(), known: known.join(", ") }
-    })
+    file::format_of(path).is_ok()
 }
 
 #[cfg(test)]

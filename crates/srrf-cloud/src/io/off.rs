@@ -1,7 +1,11 @@
 //! OFF meshes, with the broken headers of ModelNet.
 
-use super::text::parse_point;
+use std::io::{self, Write};
+use std::ops::Range;
+
+use super::scan::{Line, Lines, Splice, moved, number, turned, words, write_rows};
 use super::{CloudFormat, FormatError};
+use crate::Rigid;
 
 /// A mesh: vertices `[n, 3]`, and triangles as indices of vertices.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -10,75 +14,143 @@ pub(crate) struct Mesh {
     pub triangles: Vec<[usize; 3]>,
 }
 
-/// OFF files; the vertices are the points.
+/// Text OFF files; the vertices are the points. A moved copy keeps faces and colours as they are;
+/// the normals of NOFF are turned.
 pub(super) struct Off;
 
 impl CloudFormat for Off {
+    fn name(&self) -> &'static str {
+        "off"
+    }
+
     fn extensions(&self) -> &[&'static str] {
         &["off"]
+    }
+
+    fn recognises(&self, bytes: &[u8]) -> bool {
+        let line = Lines::new(bytes).map(|line| content(line.text)).find(|text| !text.is_empty());
+        line.is_some_and(|text| magic(text).is_some())
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
         Ok(parse_mesh(bytes)?.vertices)
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn std::io::Write) -> std::io::Result<()> {
+    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "OFF\n{} 0 0", points.len())?;
-        points.iter().try_for_each(|[x, y, z]| writeln!(out, "{x} {y} {z}"))
+        write_rows(points, "", out)
+    }
+
+    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
+        parse_mesh(bytes)?;
+        let mut lines = significant(bytes);
+        let header = Header::parse(&mut lines)?;
+        let mut splice = Splice::new(bytes, out);
+        for line in lines.take(header.vertices) {
+            let (places, old) = triple(&line, 0)?;
+            splice.numbers(&places, old, moved(motion, old))?;
+            if header.normals {
+                let (places, old) = triple(&line, 3)?;
+                splice.numbers(&places, old, turned(motion, old))?;
+            }
+        }
+        splice.finish()
     }
 }
 
-/// Reads a text OFF file. Polygons become fans of triangles; colours and normals are passed over.
-/// The counts may follow `OFF` on its own line with or without a space, as in some ModelNet files.
-pub(crate) fn parse_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
-    let text = String::from_utf8_lossy(bytes);
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .map(|(number, line)| (number + 1, line.split('#').next().unwrap_or_default().trim()))
-        .filter(|(_, line)| !line.is_empty());
+/// A line without its comment.
+fn content(text: &[u8]) -> &[u8] {
+    text.split(|&b| b == b'#').next().unwrap_or_default().trim_ascii()
+}
 
-    let (number, first) = lines.next().ok_or_else(|| FormatError::truncated("a header", "nothing"))?;
-    let rest = ["OFF", "COFF", "NOFF", "CNOFF", "NCOFF"]
-        .iter()
-        .find_map(|magic| first.strip_prefix(magic))
-        .ok_or_else(|| FormatError::Content("the file does not begin with OFF".into()))?;
-    if rest.contains("BINARY") {
-        return Err(FormatError::Content("binary OFF is not supported; save it as text".into()));
+/// The lines that hold anything, without their comments.
+fn significant(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
+    Lines::new(bytes)
+        .map(|line| {
+            let skipped = line.text.len() - line.text.trim_ascii_start().len();
+            let text = content(line.text);
+            Line { start: line.start + if text.is_empty() { 0 } else { skipped }, text, ..line }
+        })
+        .filter(|line| !line.text.is_empty())
+}
+
+/// What follows the magic word, and whether it says that there are normals.
+fn magic(text: &[u8]) -> Option<(&[u8], bool)> {
+    let words: [&[u8]; 5] = [b"OFF", b"COFF", b"NOFF", b"CNOFF", b"NCOFF"];
+    words.iter().find_map(|word| Some((text.strip_prefix(*word)?, word.contains(&b'N'))))
+}
+
+struct Header {
+    vertices: usize,
+    faces: usize,
+    normals: bool,
+}
+
+impl Header {
+    /// The counts may follow `OFF` on its own line with or without a space, as in some ModelNet
+    /// files.
+    fn parse<'a>(lines: &mut impl Iterator<Item = Line<'a>>) -> Result<Self, FormatError> {
+        let first = lines.next().ok_or_else(|| FormatError::truncated("a header", "nothing"))?;
+        let (rest, normals) = magic(first.text)
+            .ok_or_else(|| FormatError::Content("the file does not begin with OFF".into()))?;
+        let rest = rest.trim_ascii();
+        if rest.starts_with(b"BINARY") {
+            return Err(FormatError::Content("binary OFF is not supported; save it as text".into()));
+        }
+        let line = if rest.is_empty() {
+            lines.next().ok_or_else(|| FormatError::truncated("the counts", "nothing"))?
+        } else {
+            Line { text: rest, ..first }
+        };
+        let count = |(_, word)| std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
+        let counts: Vec<usize> = words(line.text).take(3).map_while(count).collect();
+        match counts[..] {
+            [vertices, faces, ..] => Ok(Self { vertices, faces, normals }),
+            _ => Err(line.error("the numbers of vertices and faces are expected")),
+        }
     }
-    let (number, counts) = if rest.trim().is_empty() {
-        lines.next().ok_or_else(|| FormatError::truncated("the counts", "nothing"))?
-    } else {
-        (number, rest.trim())
-    };
-    let counts: Vec<usize> = counts.split_whitespace().map_while(|field| field.parse().ok()).collect();
-    let [vertices, faces, ..] = counts[..] else {
-        return Err(FormatError::line(number, "the numbers of vertices and faces are expected"));
-    };
+}
 
+/// Three numbers of a line, behind `skip` words.
+fn triple(line: &Line, skip: usize) -> Result<([Range<usize>; 3], [f64; 3]), FormatError> {
+    let mut found = line.words().skip(skip);
+    let (mut places, mut point) = ([0..0, 0..0, 0..0], [0.0; 3]);
+    for axis in 0..3 {
+        let few = || line.error(format!("{} numbers where {} are expected", skip + axis, skip + 3));
+        let (at, word) = found.next().ok_or_else(few)?;
+        places[axis] = at..at + word.len();
+        point[axis] = number(word).map_err(|problem| line.error(problem))?;
+    }
+    Ok((places, point))
+}
+
+/// Reads a text OFF file. Polygons become fans of triangles; colours and normals are passed over.
+pub(crate) fn parse_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
+    let mut lines = significant(bytes);
+    let Header { vertices, faces, .. } = Header::parse(&mut lines)?;
     // The counts are not trusted with memory: a line takes 6 bytes or more.
     let mut mesh = Mesh::default();
     mesh.vertices.reserve(vertices.min(bytes.len() / 6));
-    for (number, line) in lines.by_ref().take(vertices) {
-        mesh.vertices.push(parse_point(line).map_err(|problem| FormatError::line(number, problem))?);
+    for line in lines.by_ref().take(vertices) {
+        mesh.vertices.push(triple(&line, 0)?.1);
     }
     if mesh.vertices.len() < vertices {
         let found = mesh.vertices.len().to_string();
         return Err(FormatError::truncated(format!("{vertices} vertices"), found));
     }
     let mut found = 0;
-    for (number, line) in lines.take(faces) {
-        let problem = |text: &str| FormatError::line(number, text);
-        let mut fields = line.split_whitespace().map(str::parse::<usize>);
-        let Some(Ok(count)) = fields.next() else {
-            return Err(problem("the number of corners of a face is expected"));
+    for line in lines.by_ref().take(faces) {
+        let index = |(_, word)| std::str::from_utf8(word).ok().and_then(|word| word.parse::<usize>().ok());
+        let mut fields = line.words().map(index);
+        let Some(Some(count)) = fields.next() else {
+            return Err(line.error("the number of corners of a face is expected"));
         };
-        let corners: Vec<usize> = fields.take(count).map_while(Result::ok).collect();
+        let corners: Vec<usize> = fields.take(count).map_while(|field| field).collect();
         if corners.len() < count {
-            return Err(problem("the face has fewer corners than it says"));
+            return Err(line.error("the face has fewer corners than it says"));
         }
         if corners.iter().any(|&corner| corner >= vertices) {
-            return Err(problem("the face names a vertex that does not exist"));
+            return Err(line.error("the face names a vertex that does not exist"));
         }
         for pair in corners.windows(2).skip(1) {
             mesh.triangles.push([corners[0], pair[0], pair[1]]);
@@ -88,7 +160,13 @@ pub(crate) fn parse_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
     if found < faces {
         return Err(FormatError::truncated(format!("{faces} faces"), found.to_string()));
     }
-    Ok(mesh)
+    match lines.next() {
+        Some(line) if faces == 0 => {
+            Err(line
+                .error(format!("{vertices} vertices announced, but more lines follow; correct the counts")))
+        }
+        _ => Ok(mesh),
+    }
 }
 
 #[cfg(test)]
@@ -117,5 +195,16 @@ mod tests {
         assert!(read("OFF\n1 1 0\n0 0 0\n3 0 0\n").contains("fewer corners"));
         assert!(read("OFF\n1 2 0\n0 0 0\n3 0 0 0\n").contains("2 faces announced, 1 found"));
         assert!(read("").contains("nothing") && read("OFF").contains("nothing"));
+        assert!(read("OFF\n1 0 0\n0 0 0\n1 1 1\n").contains("line 4: 1 vertices announced"));
+    }
+
+    #[test]
+    fn a_moved_copy_keeps_the_rest() {
+        let motion = Rigid { translation: [1.0, 0.0, -2.0].into(), ..Rigid::identity() };
+        let text = "# a\r\n NOFF # b\r2 1 0\n  0 0.50 0 1 0 0 255 # c\n\n1 1 1 0 0 1 9\n2 0 1 0.1\n";
+        let mut copy = Vec::new();
+        Off.rewrite(text.as_bytes(), &motion, &mut copy).unwrap();
+        let expected = text.replace("0 0.50 0 1", "1 0.50 -2 1").replace("1 1 1 0", "2 1 -1 0");
+        assert_eq!(String::from_utf8(copy).unwrap(), expected);
     }
 }

@@ -1,0 +1,182 @@
+//! E57, the exchange format of terrestrial laser scanners, read and written by the `e57` crate.
+
+mod pages;
+mod poses;
+
+use std::io::{self, Cursor, Write};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use e57::{E57Reader, E57Writer, Record, RecordDataType, RecordName, RecordValue};
+use nalgebra::{Quaternion, UnitQuaternion};
+
+use super::{CloudFormat, FormatError};
+use crate::Rigid;
+
+/// E57 files. The points of all scans are read, each scan moved by its pose into the coordinates of
+/// the file; points that the scanner marks as invalid are NaN. Written as one scan in double
+/// precision. A moved copy changes only the poses of scans and images, in double precision; all
+/// else stays byte for byte.
+pub(super) struct E57;
+
+impl CloudFormat for E57 {
+    fn name(&self) -> &'static str {
+        "e57"
+    }
+
+    fn extensions(&self) -> &[&'static str] {
+        &["e57"]
+    }
+
+    fn recognises(&self, bytes: &[u8]) -> bool {
+        bytes.starts_with(b"ASTM-E57")
+    }
+
+    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+        pages::check(bytes)?;
+        guarded(|| read(bytes))
+    }
+
+    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&guarded(|| file(points))?)
+    }
+
+    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
+        // Read once, so that a damaged file is not copied.
+        self.read(bytes)?;
+        if *motion == Rigid::identity() {
+            return out.write_all(bytes);
+        }
+        let xml = guarded(|| Ok(E57Reader::new(Cursor::new(bytes))?.xml().to_owned()))?;
+        out.write_all(&pages::with_xml(bytes, &poses::moved(&xml, motion)?)?)
+    }
+}
+
+/// What goes wrong inside.
+enum Problem {
+    Library(e57::Error),
+    Format(FormatError),
+}
+
+impl From<e57::Error> for Problem {
+    fn from(error: e57::Error) -> Self {
+        Self::Library(error)
+    }
+}
+
+/// Runs `work` of the `e57` crate; a panic on a damaged file becomes an error.
+fn guarded<T>(work: impl FnOnce() -> Result<T, Problem>) -> Result<T, FormatError> {
+    let damaged =
+        |problem: String| FormatError::Content(format!("the E57 file is damaged or cut short: {problem}"));
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(Problem::Library(error))) => Err(damaged(error.to_string())),
+        Ok(Err(Problem::Format(error))) => Err(error),
+        Err(_) => Err(damaged("it follows no rules".to_owned())),
+    }
+}
+
+fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, Problem> {
+    let mut reader = E57Reader::new(Cursor::new(bytes))?;
+    let mut points = Vec::new();
+    for scan in reader.pointclouds() {
+        let bits = scan.prototype.iter().map(|record| u128::from(bits(&record.data_type))).sum::<u128>();
+        if scan.records > 0 && (bits == 0 || bits * u128::from(scan.records) > 8 * bytes.len() as u128) {
+            let announced = format!("{} points of {bits} bits", scan.records);
+            return Err(Problem::Format(FormatError::truncated(announced, format!("{} bytes", bytes.len()))));
+        }
+        let columns = Columns::of(&scan.prototype).map_err(Problem::Format)?;
+        let pose = scan.transform.as_ref().map(|pose| {
+            let (q, t) = (&pose.rotation, &pose.translation);
+            let rotation = UnitQuaternion::from_quaternion(Quaternion::new(q.w, q.x, q.y, q.z));
+            Rigid {
+                rotation: rotation.to_rotation_matrix().into_inner(),
+                translation: [t.x, t.y, t.z].into(),
+            }
+        });
+        for values in reader.pointcloud_raw(&scan)? {
+            let point = columns.point(&values?, &scan.prototype);
+            points.push(pose.as_ref().map_or(point, |pose| pose.apply(&point)));
+        }
+    }
+    Ok(points)
+}
+
+/// Bits of a number in the file.
+fn bits(kind: &RecordDataType) -> u32 {
+    match kind {
+        RecordDataType::Single { .. } => 32,
+        RecordDataType::Double { .. } => 64,
+        RecordDataType::Integer { min, max } | RecordDataType::ScaledInteger { min, max, .. } => {
+            128 - (i128::from(*max) - i128::from(*min)).max(0).leading_zeros()
+        }
+    }
+}
+
+/// Where the coordinates of a scan are.
+struct Columns {
+    axes: [usize; 3],
+    spherical: bool,
+    invalid: Option<usize>,
+}
+
+impl Columns {
+    fn of(prototype: &[Record]) -> Result<Self, FormatError> {
+        let find = |name: RecordName| prototype.iter().position(|record| record.name == name);
+        let triple = |names: [RecordName; 3]| {
+            let [a, b, c] = names.map(find);
+            Some([a?, b?, c?])
+        };
+        let cartesian = triple([RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ]);
+        if let Some(axes) = cartesian {
+            return Ok(Self { axes, spherical: false, invalid: find(RecordName::CartesianInvalidState) });
+        }
+        let names =
+            [RecordName::SphericalRange, RecordName::SphericalAzimuth, RecordName::SphericalElevation];
+        let axes = triple(names).ok_or_else(|| {
+            FormatError::Content("a scan has neither Cartesian nor spherical coordinates".into())
+        })?;
+        Ok(Self { axes, spherical: true, invalid: find(RecordName::SphericalInvalidState) })
+    }
+
+    fn point(&self, values: &[RecordValue], prototype: &[Record]) -> [f64; 3] {
+        let value = |column: usize| match (values.get(column), prototype.get(column).map(|r| &r.data_type)) {
+            (Some(RecordValue::Single(value)), _) => f64::from(*value),
+            (Some(RecordValue::Double(value)), _) => *value,
+            (
+                Some(RecordValue::ScaledInteger(n)),
+                Some(RecordDataType::ScaledInteger { scale, offset, .. }),
+            ) => *n as f64 * scale + offset,
+            (Some(RecordValue::Integer(n) | RecordValue::ScaledInteger(n)), _) => *n as f64,
+            (None, _) => f64::NAN,
+        };
+        if self.invalid.is_some_and(|column| value(column) != 0.0) {
+            return [f64::NAN; 3];
+        }
+        let [a, b, c] = self.axes.map(value);
+        if !self.spherical {
+            return [a, b, c];
+        }
+        [a * c.cos() * b.cos(), a * c.cos() * b.sin(), a * c.sin()]
+    }
+}
+
+/// A whole file with one scan.
+fn file(points: &[[f64; 3]]) -> Result<Vec<u8>, Problem> {
+    let mut out = Cursor::new(Vec::new());
+    let mut writer = E57Writer::new(&mut out, "{00000000-0000-4000-8000-000000000000}")?;
+    let names = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
+    let kind = RecordDataType::Double { min: None, max: None };
+    let prototype = names.map(|name| Record { name, data_type: kind.clone() }).to_vec();
+    let mut scan = writer.add_pointcloud("{00000000-0000-4000-8000-000000000001}", prototype)?;
+    for point in points {
+        scan.add_point(point.map(RecordValue::Double).to_vec())?;
+    }
+    scan.finalize()?;
+    drop(scan);
+    writer.finalize()?;
+    drop(writer);
+    Ok(out.into_inner())
+}
+
+#[cfg(test)]
+mod tests;

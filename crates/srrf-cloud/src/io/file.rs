@@ -1,0 +1,252 @@
+//! [`CloudFile`]: the bytes of a file or stream, and their format.
+
+use std::fs;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+use super::{CloudFormat, FORMATS, FormatError, IoError, write_atomically};
+use crate::{CloudError, PointCloud, Rigid};
+
+/// Formats that need a cargo feature of the same name, and the extensions of their files.
+const OPTIONAL: &[(&str, &[&str])] = &[("las", &["las", "laz"]), ("e57", &["e57"])];
+
+/// What a moved copy keeps of its original.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kept {
+    /// All that the file holds besides the points.
+    Everything,
+    /// Only the points, because the copy is of another format.
+    Points,
+}
+
+/// The names of all formats of this build, for help texts.
+pub fn format_names() -> Vec<&'static str> {
+    FORMATS.iter().map(|format| format.name()).collect()
+}
+
+/// A file or stream of a cloud: its bytes in memory, and their format.
+pub struct CloudFile {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    format: &'static dyn CloudFormat,
+}
+
+impl CloudFile {
+    /// Reads the file at `path`. Its extension says the format, or where that is unknown or missing
+    /// the content.
+    ///
+    /// # Errors
+    /// [`IoError::Read`], [`IoError::UnknownFormat`], [`IoError::LeftOut`].
+    pub fn open(path: &Path) -> Result<Self, IoError> {
+        let known = format_of(path);
+        if let Err(left_out @ IoError::LeftOut { .. }) = known {
+            return Err(left_out);
+        }
+        let bytes = fs::read(path).map_err(|source| IoError::Read { path: path.to_owned(), source })?;
+        let format = match known {
+            Ok(format) => format,
+            Err(_) => detect(path, &bytes)?,
+        };
+        Ok(Self { path: path.to_owned(), bytes, format })
+    }
+
+    /// Reads a stream to its end. `format` is the name or an extension of its format; without it the
+    /// content says it. Errors call the stream `-`.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn from_reader(reader: &mut dyn Read, format: Option<&str>) -> Result<Self, IoError> {
+        let format = format.map(named).transpose()?;
+        let path = PathBuf::from("-");
+        let mut bytes = Vec::new();
+        if let Err(source) = reader.read_to_end(&mut bytes) {
+            return Err(IoError::Read { path, source });
+        }
+        let format = match format {
+            Some(format) => format,
+            None => detect(&path, &bytes)?,
+        };
+        Ok(Self { path, bytes, format })
+    }
+
+    /// The name of the format.
+    pub fn format(&self) -> &'static str {
+        self.format.name()
+    }
+
+    /// The path, or `-` for a stream.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// All points, in the order of the file; shape `[n, 3]`, n > 0, any numbers.
+    ///
+    /// # Errors
+    /// [`IoError::Format`], [`IoError::OtherFormat`], and [`IoError::Cloud`] where there are none.
+    pub fn points(&self) -> Result<Vec<[f64; 3]>, IoError> {
+        let points = self.format.read(&self.bytes).map_err(|source| self.error(source))?;
+        if points.is_empty() {
+            return Err(IoError::Cloud { path: self.path.clone(), source: CloudError::Empty });
+        }
+        Ok(points)
+    }
+
+    /// The cloud.
+    ///
+    /// # Errors
+    /// As [`points`](Self::points); [`IoError::NotFinite`] where there are NaN or infinite
+    /// coordinates.
+    pub fn cloud(&self) -> Result<PointCloud, IoError> {
+        let points = self.points()?;
+        let bad = |p: &[f64; 3]| !p.iter().all(|c| c.is_finite());
+        if let Some(first) = points.iter().position(bad) {
+            let count = points.iter().filter(|p| bad(p)).count();
+            return Err(IoError::NotFinite { path: self.path.clone(), count, total: points.len(), first });
+        }
+        self.checked(points)
+    }
+
+    /// The cloud without the points that have NaN or infinite coordinates, and how many they were.
+    ///
+    /// # Errors
+    /// As [`points`](Self::points); [`IoError::Cloud`] also where no point is left.
+    pub fn cloud_dropping_nan(&self) -> Result<(PointCloud, usize), IoError> {
+        let mut points = self.points()?;
+        let before = points.len();
+        points.retain(|p| p.iter().all(|c| c.is_finite()));
+        let dropped = before - points.len();
+        Ok((self.checked(points)?, dropped))
+    }
+
+    /// Writes `output` with the points moved by `motion` and the normals turned: with all else
+    /// unchanged if its extension says the same format, otherwise only the points. The file appears
+    /// whole or not at all.
+    ///
+    /// # Errors
+    /// [`IoError`], which names the file.
+    pub fn write_transformed(&self, output: &Path, motion: &Rigid) -> Result<Kept, IoError> {
+        let format = format_of(output)?;
+        let mut kept = Kept::Points;
+        let written = write_atomically(output, |out| {
+            kept = self.put_transformed(format, motion, out)?;
+            Ok(())
+        });
+        written.map(|()| kept).map_err(|source| self.write_error(output, source))
+    }
+
+    /// As [`write_transformed`](Self::write_transformed), to a stream. `format` is the name or an
+    /// extension of its format; without it the copy has the same one.
+    ///
+    /// # Errors
+    /// [`IoError`]; errors call the stream `-`.
+    pub fn write_transformed_to(
+        &self,
+        out: &mut dyn Write,
+        format: Option<&str>,
+        motion: &Rigid,
+    ) -> Result<Kept, IoError> {
+        let format = format.map_or(Ok(self.format), named)?;
+        let written = self.put_transformed(format, motion, out).and_then(|kept| out.flush().map(|()| kept));
+        written.map_err(|source| self.write_error(Path::new("-"), source))
+    }
+
+    fn put_transformed(
+        &self,
+        format: &'static dyn CloudFormat,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<Kept> {
+        if format.name() == self.format.name() {
+            format.rewrite(&self.bytes, motion, out)?;
+            return Ok(Kept::Everything);
+        }
+        let mut points = self.format.read(&self.bytes)?;
+        points.iter_mut().for_each(|point| *point = super::scan::moved(motion, *point));
+        format.write(&points, out)?;
+        Ok(Kept::Points)
+    }
+
+    fn checked(&self, points: Vec<[f64; 3]>) -> Result<PointCloud, IoError> {
+        PointCloud::new(points).map_err(|source| IoError::Cloud { path: self.path.clone(), source })
+    }
+
+    /// What is wrong with the content, or that it is of another format altogether.
+    fn error(&self, source: FormatError) -> IoError {
+        let path = self.path.clone();
+        let found = FORMATS.iter().find(|format| format.recognises(&self.bytes)).map(|format| format.name());
+        match found {
+            Some(found) if found != self.format.name() => {
+                IoError::OtherFormat { path, asked: self.format.name(), found, source }
+            }
+            _ => IoError::Format { path, source },
+        }
+    }
+
+    /// Tells errors of the content from those of writing.
+    fn write_error(&self, output: &Path, source: io::Error) -> IoError {
+        match source.downcast::<FormatError>() {
+            Ok(source @ FormatError::Unwritable(_)) => {
+                IoError::Write { path: output.to_owned(), source: source.into() }
+            }
+            Ok(source) => self.error(source),
+            Err(source) => IoError::Write { path: output.to_owned(), source },
+        }
+    }
+}
+
+impl std::fmt::Debug for CloudFile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let bytes = self.bytes.len();
+        f.debug_struct("CloudFile")
+            .field("path", &self.path)
+            .field("format", &self.format())
+            .field("bytes", &bytes)
+            .finish()
+    }
+}
+
+/// The format that the extension of `path` says.
+pub(super) fn format_of(path: &Path) -> Result<&'static dyn CloudFormat, IoError> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let unknown =
+        if extension.is_empty() { "there is no extension" } else { "the extension says no known format" };
+    find(path, &extension, unknown)
+}
+
+/// The format of this name or extension.
+pub(super) fn named(name: &str) -> Result<&'static dyn CloudFormat, IoError> {
+    find(Path::new(name), &name.to_ascii_lowercase(), "this is the name of no known format")
+}
+
+fn find(path: &Path, name: &str, fact: &'static str) -> Result<&'static dyn CloudFormat, IoError> {
+    let is = |format: &&&dyn CloudFormat| format.name() == name || format.extensions().contains(&name);
+    if let Some(format) = FORMATS.iter().find(is) {
+        return Ok(*format);
+    }
+    match OPTIONAL.iter().find(|(_, extensions)| extensions.contains(&name)) {
+        Some((format, _)) => Err(IoError::LeftOut { path: path.to_owned(), format }),
+        None => Err(unknown(path, fact)),
+    }
+}
+
+/// The format that the content says.
+fn detect(path: &Path, bytes: &[u8]) -> Result<&'static dyn CloudFormat, IoError> {
+    if bytes.is_empty() {
+        return Err(IoError::Cloud { path: path.to_owned(), source: CloudError::Empty });
+    }
+    if let Some(format) = FORMATS.iter().find(|format| format.recognises(bytes)) {
+        return Ok(*format);
+    }
+    for (magic, format) in [(&b"LASF"[..], "las"), (b"ASTM-E57", "e57")] {
+        if bytes.starts_with(magic) {
+            return Err(IoError::LeftOut { path: path.to_owned(), format });
+        }
+    }
+    Err(unknown(path, "neither the name nor the content says a known format"))
+}
+
+fn unknown(path: &Path, fact: &'static str) -> IoError {
+    let mut known: Vec<&str> = FORMATS.iter().flat_map(|f| f.extensions()).copied().collect();
+    known.extend(FORMATS.iter().map(|f| f.name()).filter(|name| !known.contains(name)).collect::<Vec<_>>());
+    IoError::UnknownFormat { path: path.to_owned(), fact, known: known.join(", ") }
+}

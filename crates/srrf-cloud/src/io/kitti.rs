@@ -1,0 +1,105 @@
+//! The scans of the KITTI odometry set: `x y z intensity` in single precision, without a header.
+
+use std::io::{self, Write};
+
+use super::scan::moved;
+use super::single::check_single;
+use super::{CloudFormat, FormatError};
+use crate::Rigid;
+
+/// Bytes of a point.
+const RECORD: usize = 16;
+
+/// KITTI's `.bin`: records of four `f32`, little endian. A moved copy keeps the intensities;
+/// a cloud is written with intensity 0. Written only where single precision is enough.
+pub(super) struct Kitti;
+
+impl CloudFormat for Kitti {
+    fn name(&self) -> &'static str {
+        "kitti"
+    }
+
+    fn extensions(&self) -> &[&'static str] {
+        &["bin"]
+    }
+
+    fn recognises(&self, _bytes: &[u8]) -> bool {
+        false // any bytes could be numbers
+    }
+
+    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+        if !bytes.len().is_multiple_of(RECORD) {
+            let five = if bytes.len().is_multiple_of(20) {
+                " (records of 20 bytes would fit: nuScenes?)"
+            } else {
+                ""
+            };
+            return Err(FormatError::Content(format!(
+                "{} bytes are no whole number of records of {RECORD} bytes (x, y, z, intensity as 32-bit floats)\
+                 {five}; the file is cut short or of another kind",
+                bytes.len()
+            )));
+        }
+        Ok(bytes.as_chunks::<RECORD>().0.iter().map(point).collect())
+    }
+
+    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
+        check_single(points, "KITTI .bin")?;
+        points.iter().try_for_each(|point| out.write_all(&record(point, [0; 4])))
+    }
+
+    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
+        let points: Vec<[f64; 3]> = self.read(bytes)?.into_iter().map(|p| moved(motion, p)).collect();
+        check_single(&points, "KITTI .bin")?;
+        for (point, old) in points.iter().zip(bytes.as_chunks::<RECORD>().0) {
+            out.write_all(&record(point, [old[12], old[13], old[14], old[15]]))?;
+        }
+        Ok(())
+    }
+}
+
+fn point(record: &[u8; RECORD]) -> [f64; 3] {
+    let words = record.as_chunks::<4>().0;
+    std::array::from_fn(|axis| f32::from_le_bytes(words[axis]).into())
+}
+
+fn record(point: &[f64; 3], intensity: [u8; 4]) -> [u8; RECORD] {
+    let words =
+        [(point[0] as f32).to_le_bytes(), (point[1] as f32).to_le_bytes(), (point[2] as f32).to_le_bytes()];
+    let mut bytes = [0; RECORD];
+    for (slot, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(words.iter().chain([&intensity])) {
+        *slot = *word;
+    }
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_of_four_floats() {
+        let mut bytes = Vec::new();
+        for value in [1.5f32, -2.0, 0.1, 0.75, 4.0, f32::NAN, 1e-40, 0.5] {
+            bytes.extend(value.to_le_bytes());
+        }
+        let points = Kitti.read(&bytes).unwrap();
+        assert_eq!(points[0], [1.5, -2.0, f64::from(0.1f32)]);
+        assert!(points[1][1].is_nan());
+        let mut copy = Vec::new();
+        Kitti.rewrite(&bytes, &Rigid::identity(), &mut copy).unwrap();
+        assert_eq!(copy, bytes, "intensity and NaN stay");
+        for length in (1..32).filter(|n| n % 16 != 0) {
+            let message = Kitti.read(&bytes[..length]).unwrap_err().to_string();
+            assert!(message.contains("records of 16 bytes"), "{message}");
+        }
+        assert!(Kitti.read(&[0; 20]).unwrap_err().to_string().contains("nuScenes"));
+    }
+
+    #[test]
+    fn large_coordinates_are_refused() {
+        let utm = [[431_234.567_8, 4_812_345.678_9, 12.0], [431_254.567_8, 4_812_345.678_9, 12.0]];
+        let error = Kitti.write(&utm, &mut Vec::new()).unwrap_err().to_string();
+        assert!(error.contains("single precision") && error.contains(".ply"), "{error}");
+    }
+}

@@ -1,0 +1,182 @@
+//! LAS and LAZ, the formats of airborne laser scanning. The header is read by a small parser of our
+//! own, which checks every count before it is used (the `las` crate allocates by the header's
+//! words); the compression of LAZ is that of the `laz` crate.
+
+mod header;
+mod zipped;
+
+use std::io::{self, Write};
+
+use self::header::{Axis, Header};
+use super::scan::moved;
+use super::{CloudFormat, FormatError};
+use crate::Rigid;
+
+/// LAS files, versions 1.0 to 1.4. Coordinates are 32-bit integers times a scale plus an offset;
+/// they are read exactly so, and written with a step of at most a billionth of the cloud's size (a
+/// micrometre on a kilometre), to which points are rounded. A moved copy keeps all attributes,
+/// records and the coordinate system as they are; its step is up to 100 times finer than the
+/// original's.
+pub(super) struct Las;
+
+/// LAZ files, which are LAS compressed. Where a file is compressed but for its name, or the other
+/// way round, it is read (and copied) as what it is.
+pub(super) struct Laz;
+
+impl CloudFormat for Las {
+    fn name(&self) -> &'static str {
+        "las"
+    }
+
+    fn extensions(&self) -> &[&'static str] {
+        &["las"]
+    }
+
+    fn recognises(&self, bytes: &[u8]) -> bool {
+        bytes.starts_with(b"LASF") && !bytes.get(104).is_some_and(|format| format & 0x80 != 0)
+    }
+
+    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+        read(bytes)
+    }
+
+    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&file(points, false)?)
+    }
+
+    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&rewritten(bytes, motion)?)
+    }
+}
+
+impl CloudFormat for Laz {
+    fn name(&self) -> &'static str {
+        "laz"
+    }
+
+    fn extensions(&self) -> &[&'static str] {
+        &["laz"]
+    }
+
+    fn recognises(&self, bytes: &[u8]) -> bool {
+        bytes.starts_with(b"LASF")
+    }
+
+    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+        read(bytes)
+    }
+
+    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&file(points, true)?)
+    }
+
+    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&rewritten(bytes, motion)?)
+    }
+}
+
+fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+    let header = Header::parse(bytes)?;
+    Ok(points(&header, &header.records(bytes)?))
+}
+
+/// The points of uncompressed records.
+fn points(header: &Header, records: &[u8]) -> Vec<[f64; 3]> {
+    let word = |record: &[u8], axis: usize| {
+        record
+            .get(axis * 4..)
+            .and_then(|rest| rest.first_chunk())
+            .map_or(0, |&bytes| i32::from_le_bytes(bytes))
+    };
+    let value = |record: &[u8], axis: usize| header.axes[axis].value(word(record, axis));
+    let rows = records.chunks_exact(header.record_length);
+    rows.map(|record| [value(record, 0), value(record, 1), value(record, 2)]).collect()
+}
+
+/// The axes that hold `points`, with a step of at most `coarsest`.
+fn axes_for(points: &[[f64; 3]], coarsest: Option<[f64; 3]>) -> Result<[Axis; 3], FormatError> {
+    let mut axes = [Axis { scale: 1.0, offset: 0.0 }; 3];
+    for (axis, slot) in axes.iter_mut().enumerate() {
+        let values = || points.iter().map(|p| p[axis]);
+        let (low, high) =
+            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        if points.is_empty() {
+            continue;
+        }
+        let extent = high - low;
+        if !(extent.is_finite() && low.abs().max(high.abs()) < 1e15) {
+            let problem = format!("LAS holds no coordinates from {low:e} to {high:e}; write .ply");
+            return Err(FormatError::Unwritable(problem));
+        }
+        slot.offset = ((low + high) / 2.0).round();
+        // The finest power of ten with which the extent stays under 10^9 steps; the offset adds one
+        // unit at most.
+        let reach = (extent / 2.0 + 1.0).min(if extent > 0.0 { f64::INFINITY } else { 1.0 });
+        slot.scale = 10f64.powi((reach.log10() - 9.0).ceil() as i32);
+        if let Some(coarsest) = coarsest {
+            let fine = |n: i32| coarsest[axis] / 10f64.powi(n);
+            let fits = |scale: f64| (extent / 2.0 + 1.0) / scale < 2e9;
+            slot.scale =
+                (0..3).rev().map(fine).find(|&scale| fits(scale)).unwrap_or(slot.scale.max(coarsest[axis]));
+        }
+    }
+    Ok(axes)
+}
+
+/// A whole file of version 1.2 with points of format 0.
+fn file(points: &[[f64; 3]], zipped: bool) -> io::Result<Vec<u8>> {
+    let axes = axes_for(points, None)?;
+    let mut records = vec![0; points.len() * 20];
+    put_points(points, &axes, 20, &mut records);
+    let (mut bytes, vlr) = header::new_header(points, &axes, zipped)?;
+    match vlr {
+        Some(vlr) => zipped::compress(&mut bytes, vlr, &records)?,
+        None => bytes.extend(records),
+    }
+    Ok(bytes)
+}
+
+/// Puts the coordinates into records.
+fn put_points(points: &[[f64; 3]], axes: &[Axis; 3], length: usize, records: &mut [u8]) {
+    for (record, point) in records.chunks_exact_mut(length).zip(points) {
+        for (axis, slot) in record.as_chunks_mut::<4>().0.iter_mut().take(3).enumerate() {
+            *slot = axes[axis].steps(point[axis]).to_le_bytes();
+        }
+    }
+}
+
+fn rewritten(bytes: &[u8], motion: &Rigid) -> io::Result<Vec<u8>> {
+    let header = Header::parse(bytes)?;
+    let mut records = header.records(bytes)?.into_owned();
+    let old = points(&header, &records);
+    let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
+    if old == new {
+        return Ok(bytes.to_vec());
+    }
+    let axes = axes_for(&new, Some(header.axes.map(|axis| axis.scale)))?;
+    put_points(&new, &axes, header.record_length, &mut records);
+    let mut copy = bytes[..header.points_at].to_vec();
+    let steps: Vec<[f64; 3]> =
+        new.iter().map(|p| std::array::from_fn(|axis| axes[axis].value(axes[axis].steps(p[axis])))).collect();
+    header::put_axes(&mut copy, &axes, &steps);
+    if !header.zipped {
+        copy.extend(&records);
+        copy.extend(&bytes[header.points_at + records.len()..]);
+        return Ok(copy);
+    }
+    if header.waveforms_inside(bytes) {
+        let problem = "LAZ with waveforms inside cannot be moved; unpack it to .las first";
+        return Err(FormatError::Unwritable(problem.into()).into());
+    }
+    let vlr = header.laz(bytes)?;
+    zipped::compress(&mut copy, vlr, &records)?;
+    if let Some(tail) = header.extended_records(bytes) {
+        let at = copy.len() as u64;
+        header::put_word(&mut copy, 235, &at.to_le_bytes());
+        copy.extend(tail);
+    }
+    Ok(copy)
+}
+
+#[cfg(test)]
+mod tests;

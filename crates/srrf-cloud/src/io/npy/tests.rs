@@ -1,0 +1,92 @@
+use npyz::WriterBuilder;
+
+use super::*;
+
+/// Arrays written by an independent implementation.
+fn array<T: npyz::AutoSerialize + Copy>(shape: &[u64], order: npyz::Order, data: &[T]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut writer = npyz::WriteOptions::new()
+        .default_dtype()
+        .shape(shape)
+        .order(order)
+        .writer(&mut bytes)
+        .begin_nd()
+        .unwrap();
+    writer.extend(data.iter().copied()).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+fn with_header(text: &str, body: &[u8]) -> Vec<u8> {
+    let mut bytes = b"\x93NUMPY\x02\x00".to_vec();
+    bytes.extend((text.len() as u32).to_le_bytes());
+    bytes.extend(text.as_bytes());
+    bytes.extend(body);
+    bytes
+}
+
+#[test]
+fn orders_types_and_widths() {
+    let expected = vec![[0.0, 1.0, 2.0], [4.0, 5.0, 6.0]];
+    let c: Vec<f32> = (0..8).map(|v| v as f32).collect();
+    assert_eq!(Npy.read(&array(&[2, 4], npyz::Order::C, &c)).unwrap(), expected);
+    let f: Vec<i32> = vec![0, 4, 1, 5, 2, 6];
+    assert_eq!(Npy.read(&array(&[2, 3], npyz::Order::Fortran, &f)).unwrap(), expected);
+    let i: Vec<i64> = vec![0, 1, 2, 4, 5, 6];
+    assert_eq!(Npy.read(&array(&[2, 3], npyz::Order::C, &i)).unwrap(), expected);
+}
+
+#[test]
+fn fields_and_big_endian_numbers() {
+    let text = "{'descr': [('i', '|u1'), ('z', '>f4'), (\"x\", '<f8'), ('y', '>i2')],\n 'fortran_order': False, 'shape': (1,)}";
+    let mut body = vec![7];
+    body.extend(2.5f32.to_be_bytes());
+    body.extend(0.1f64.to_le_bytes());
+    body.extend((-3i16).to_be_bytes());
+    assert_eq!(Npy.read(&with_header(text, &body)).unwrap(), [[0.1, -3.0, 2.5]]);
+    let motion = Rigid { translation: [0.0, 0.5, 0.0].into(), ..Rigid::identity() };
+    let mut copy = Vec::new();
+    Npy.rewrite(&with_header(text, &body), &motion, &mut copy).unwrap();
+    assert_eq!(Npy.read(&copy).unwrap(), [[0.1, -2.5, 2.5]], "the integer became a double");
+    assert_eq!(copy[copy.len() - 25], 7, "and the other field is still there");
+}
+
+#[test]
+fn a_header_like_that_of_numpy() {
+    let mut ours = Vec::new();
+    Npy.write(&[[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]], &mut ours).unwrap();
+    let read = npyz::NpyFile::new(&ours[..]).unwrap();
+    assert_eq!((read.shape(), (ours.len() - 48) % 64), (&[2, 3][..], 0));
+    assert_eq!(read.into_vec::<f64>().unwrap(), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+}
+
+#[test]
+fn bad_arrays() {
+    let good = array(&[2, 3], npyz::Order::C, &[0.0f64; 6]);
+    for length in 0..good.len() {
+        assert!(Npy.read(&good[..length]).is_err(), "{length}");
+    }
+    assert!(Npy.read(&[&good[..], &[0]].concat()).is_err());
+    assert!(Npy.read(&array(&[6], npyz::Order::C, &[0.0f64; 6])).is_err());
+    let error = Npy.read(&array(&[3, 2], npyz::Order::C, &[0.0f64; 6])).unwrap_err().to_string();
+    assert!(error.contains("[3, 2]") && error.contains("transpose"), "{error}");
+    for (text, fact) in [
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904, 3), }", "no memory"),
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000000, 3), }", "announced"),
+        ("{'descr': '<f8', 'fortran_order': False, 'shape': (0, 1000000000000000000), }", ""),
+        ("{'descr': '|O', 'fortran_order': False, 'shape': (1, 3), }", "type \"|O\""),
+        ("{'descr': [('x', '<f8', (3,))], 'fortran_order': False, 'shape': (1,), }", "expected"),
+        ("{'shape': (1, 3)}", "lacks"),
+        ("{'descr': '<f8", "end of a string"),
+    ] {
+        let read = Npy.read(&with_header(text, &[]));
+        if fact.is_empty() {
+            assert_eq!(read, Ok(vec![]));
+        } else {
+            let error = read.unwrap_err().to_string();
+            assert!(error.contains(fact), "{error}");
+        }
+    }
+    let deep = "(".repeat(60_000);
+    assert!(Npy.read(&with_header(&format!("{{'shape': {deep}"), &[])).is_err());
+}

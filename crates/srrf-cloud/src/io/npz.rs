@@ -1,0 +1,186 @@
+//! NumPy's archives of arrays.
+
+use std::io::{self, Cursor, Read, Write};
+
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+use super::npy::{Npy, cloud_bytes};
+use super::{CloudFormat, FormatError};
+use crate::Rigid;
+
+/// Names of the array that is the cloud, the first of them that is there.
+const NAMES: [&str; 8] = ["points", "xyz", "cloud", "pcd", "coords", "pos", "vertices", "arr_0"];
+/// Arrays may unpack to this many times the archive's size and `SLACK` more: real clouds do not
+/// come near, and a small file cannot fill the memory.
+const RATIO: u64 = 200;
+const SLACK: u64 = 1 << 20;
+
+/// NPZ archives, compressed or not. The cloud is the array named `points`, `xyz`, `cloud`, `pcd`,
+/// `coords`, `pos`, `vertices` or `arr_0`, or else the only one whose shape is `[n, 3]` or wider.
+/// Written with one array, `points`. A moved copy keeps all other arrays as they are.
+pub(super) struct Npz;
+
+impl CloudFormat for Npz {
+    fn name(&self) -> &'static str {
+        "npz"
+    }
+
+    fn extensions(&self) -> &[&'static str] {
+        &["npz"]
+    }
+
+    fn recognises(&self, bytes: &[u8]) -> bool {
+        bytes.starts_with(b"PK\x03\x04")
+    }
+
+    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+        let mut archive = open(bytes)?;
+        let cloud = choose(&mut archive)?;
+        Npy.read(&unpack(&mut archive, cloud, bytes.len())?)
+    }
+
+    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
+        let mut array = Vec::new();
+        Npy.write(points, &mut array)?;
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        put(&mut archive, "points.npy", CompressionMethod::Stored, &array)?;
+        out.write_all(archive.finish()?.get_ref())
+    }
+
+    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
+        let mut archive = open(bytes)?;
+        let cloud = choose(&mut archive)?;
+        let array = unpack(&mut archive, cloud, bytes.len())?;
+        let mut copy = Vec::new();
+        Npy.rewrite(&array, motion, &mut copy)?;
+        let mut written = ZipWriter::new(Cursor::new(Vec::new()));
+        for index in 0..archive.len() {
+            let entry = archive.by_index_raw(index)?;
+            if index == cloud {
+                let (name, method) = (entry.name()?.into_owned(), entry.compression());
+                put(&mut written, &name, method, &copy)?;
+            } else {
+                written.raw_copy_file(entry)?;
+            }
+        }
+        out.write_all(written.finish()?.get_ref())
+    }
+}
+
+type Archive<'a> = ZipArchive<Cursor<&'a [u8]>>;
+
+fn open(bytes: &[u8]) -> Result<Archive<'_>, FormatError> {
+    let problem = |e| FormatError::Content(format!("not an NPZ archive, or cut short: {e}"));
+    ZipArchive::new(Cursor::new(bytes)).map_err(problem)
+}
+
+/// The index of the array that is the cloud.
+fn choose(archive: &mut Archive) -> Result<usize, FormatError> {
+    let mut arrays = Vec::new();
+    for index in 0..archive.len() {
+        let Ok(entry) = archive.by_index(index) else { continue };
+        let Some(name) = entry.name().ok().and_then(|name| Some(name.strip_suffix(".npy")?.to_owned()))
+        else {
+            continue;
+        };
+        // Enough for the header of any array that could be a cloud.
+        let mut begin = Vec::new();
+        let could_be = entry.take(4096).read_to_end(&mut begin).is_ok() && cloud_bytes(&begin).is_some();
+        arrays.push((index, name, could_be));
+    }
+    let named = NAMES.iter().find_map(|name| arrays.iter().find(|(_, array, _)| array == name));
+    let mut fitting = arrays.iter().filter(|(_, _, could_be)| *could_be);
+    match (named, fitting.next(), fitting.next()) {
+        (Some((index, _, _)), _, _) | (None, Some((index, _, _)), None) => Ok(*index),
+        (None, one, _) => {
+            let names: Vec<&str> = arrays.iter().map(|(_, name, _)| name.as_str()).take(20).collect();
+            let count = if one.is_none() { "none" } else { "more than one" };
+            Err(FormatError::Content(format!(
+                "of the arrays {names:?} {count} has a shape [points, 3]; name the cloud `points`"
+            )))
+        }
+    }
+}
+
+/// The bytes of an array.
+fn unpack(archive: &mut Archive, index: usize, packed: usize) -> Result<Vec<u8>, FormatError> {
+    let problem = |e: String| FormatError::Content(format!("cannot unpack the array: {e}"));
+    let entry = archive.by_index(index).map_err(|e| problem(e.to_string()))?;
+    let most = packed as u64 * RATIO + SLACK;
+    let mut array = Vec::new();
+    entry.take(most + 1).read_to_end(&mut array).map_err(|e| problem(e.to_string()))?;
+    if array.len() as u64 > most {
+        return Err(problem(format!(
+            "it is more than {RATIO} times larger than the file; save it uncompressed"
+        )));
+    }
+    Ok(array)
+}
+
+fn put(
+    archive: &mut ZipWriter<Cursor<Vec<u8>>>,
+    name: &str,
+    method: CompressionMethod,
+    array: &[u8],
+) -> io::Result<()> {
+    let options = SimpleFileOptions::default()
+        .compression_method(method)
+        .large_file(array.len() as u64 > u64::from(u32::MAX) / 2);
+    archive.start_file(name, options)?;
+    archive.write_all(array)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn archive(arrays: &[(&str, &[[f64; 3]])], method: CompressionMethod) -> Vec<u8> {
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        for (name, points) in arrays {
+            let mut array = Vec::new();
+            Npy.write(points, &mut array).unwrap();
+            put(&mut archive, name, method, &array).unwrap();
+        }
+        put(&mut archive, "note.txt", method, b"a").unwrap();
+        archive.finish().unwrap().into_inner()
+    }
+
+    const A: &[[f64; 3]] = &[[0.1, 2.0, 3.0]];
+    const B: &[[f64; 3]] = &[[4.0, 5.0, 6.0], [7.0, 8.0, 9.0]];
+
+    #[test]
+    fn the_cloud_is_chosen_by_name_or_shape() {
+        for method in [CompressionMethod::Stored, CompressionMethod::Deflated] {
+            assert_eq!(Npz.read(&archive(&[("other.npy", B), ("points.npy", A)], method)).unwrap(), A);
+            assert_eq!(Npz.read(&archive(&[("other.npy", B)], method)).unwrap(), B);
+        }
+        let two = archive(&[("a.npy", A), ("b.npy", B)], CompressionMethod::Stored);
+        let error = Npz.read(&two).unwrap_err().to_string();
+        assert!(error.contains("[\"a\", \"b\"]") && error.contains("more than one"), "{error}");
+        assert!(Npz.read(&archive(&[], CompressionMethod::Stored)).unwrap_err().to_string().contains("none"));
+    }
+
+    #[test]
+    fn a_moved_copy_keeps_the_other_arrays() {
+        let bytes = archive(&[("b.npy", B), ("points.npy", A)], CompressionMethod::Deflated);
+        let motion = Rigid { translation: [1.0, 0.0, 0.0].into(), ..Rigid::identity() };
+        let mut copy = Vec::new();
+        Npz.rewrite(&bytes, &motion, &mut copy).unwrap();
+        assert_eq!(Npz.read(&copy).unwrap(), [[1.1, 2.0, 3.0]]);
+        let mut read = open(&copy).unwrap();
+        assert_eq!(read.len(), 3);
+        assert_eq!(Npy.read(&unpack(&mut read, 0, copy.len()).unwrap()).unwrap(), B);
+    }
+
+    #[test]
+    fn bombs_and_damage() {
+        let bomb = archive(&[("points.npy", &vec![[0.0; 3]; 300_000])], CompressionMethod::Deflated);
+        assert!(bomb.len() < 20_000);
+        assert!(Npz.read(&bomb).unwrap_err().to_string().contains("200 times"));
+        let good = archive(&[("points.npy", B)], CompressionMethod::Deflated);
+        for length in 0..good.len() {
+            assert!(Npz.read(&good[..length]).is_err(), "{length}");
+        }
+    }
+}

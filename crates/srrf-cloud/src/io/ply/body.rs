@@ -1,0 +1,169 @@
+//! The rows behind the header of a PLY file.
+
+use std::ops::Range;
+
+use super::super::FormatError;
+use super::super::scalar::Scalar;
+use super::super::scan::number;
+use super::header::{Element, Encoding, Header, Property};
+
+/// A place in the body that moves on number by number.
+pub(super) struct Cursor<'a> {
+    pub bytes: &'a [u8],
+    pub at: usize,
+    pub encoding: Encoding,
+}
+
+impl<'a> Cursor<'a> {
+    /// The place of the first row of `vertex`, and that element.
+    pub fn at_vertices<'h>(
+        bytes: &'a [u8],
+        header: &'h Header,
+    ) -> Result<(Self, &'h Element, bool), FormatError> {
+        let mut cursor = Self { bytes, at: header.body, encoding: header.encoding };
+        for (index, element) in header.elements.iter().enumerate() {
+            if element.name == "vertex" {
+                return Ok((cursor, element, index + 1 == header.elements.len()));
+            }
+            cursor.skip_element(element)?;
+        }
+        Err(FormatError::Content("the file has no element `vertex`: it holds no points".into()))
+    }
+
+    /// The place of the next number; `None` at the end.
+    #[inline]
+    pub fn next(&mut self, scalar: Scalar) -> Option<Range<usize>> {
+        let rest = self.bytes.get(self.at..)?;
+        let (skipped, length) = match self.encoding {
+            Encoding::Binary { .. } => (0, (rest.len() >= scalar.size()).then_some(scalar.size())?),
+            Encoding::Ascii => {
+                let begin = rest.iter().position(|b| !b.is_ascii_whitespace())?;
+                let word = &rest[begin..];
+                (begin, word.iter().position(u8::is_ascii_whitespace).unwrap_or(word.len()))
+            }
+        };
+        let begin = self.at + skipped;
+        self.at = begin + length;
+        Some(begin..self.at)
+    }
+
+    /// The number at a place from [`next`](Self::next).
+    #[inline]
+    pub fn value(&self, place: &Range<usize>, scalar: Scalar) -> Result<f64, FormatError> {
+        match self.encoding {
+            Encoding::Binary { big_endian } => scalar
+                .get(self.bytes, place.start, big_endian)
+                .ok_or_else(|| FormatError::truncated("a number", "the end of the file")),
+            Encoding::Ascii => {
+                number(&self.bytes[place.clone()]).map_err(|e| FormatError::line(self.line(place.start), e))
+            }
+        }
+    }
+
+    /// The line that holds the byte at `at`, from 1.
+    fn line(&self, at: usize) -> usize {
+        1 + self.bytes[..at].iter().filter(|&&b| b == b'\n').count()
+    }
+
+    /// Passes over a property; its place if it is a scalar. `None` at the end of the file.
+    pub fn property(&mut self, property: &Property) -> Result<Option<Range<usize>>, FormatError> {
+        let Some(length) = property.length else { return Ok(self.next(property.scalar)) };
+        let Some(place) = self.next(length) else { return Ok(None) };
+        let count = self.value(&place, length)?;
+        if !(count >= 0.0 && count.fract() == 0.0) {
+            let problem = format!("the list `{}` has the length {count}", property.name);
+            return Err(match self.encoding {
+                Encoding::Ascii => FormatError::line(self.line(place.start), problem),
+                Encoding::Binary { .. } => FormatError::Content(format!("byte {}: {problem}", place.start)),
+            });
+        }
+        if let Encoding::Binary { .. } = self.encoding {
+            // A float count saturates; more than there are bytes is the end of the file.
+            let bytes = (count as usize).checked_mul(property.scalar.size());
+            return Ok(bytes.filter(|&n| n <= self.bytes.len() - self.at).map(|n| {
+                self.at += n;
+                place
+            }));
+        }
+        let whole = (0..count as u64).all(|_| self.next(property.scalar).is_some());
+        Ok(whole.then_some(place))
+    }
+
+    fn skip_element(&mut self, element: &Element) -> Result<(), FormatError> {
+        // Rows without properties take no bytes.
+        let rows = if element.properties.is_empty() { 0 } else { element.count };
+        for row in 0..rows {
+            for property in &element.properties {
+                if self.property(property)?.is_none() {
+                    return Err(cut_short(element, row));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes through the rows of the vertices: `row` gets the places of all properties.
+    pub fn rows(
+        &mut self,
+        element: &Element,
+        mut row: impl FnMut(&Self, &[Range<usize>]) -> Result<(), FormatError>,
+    ) -> Result<(), FormatError> {
+        let mut places = Vec::with_capacity(element.properties.len());
+        for index in 0..element.count {
+            places.clear();
+            for property in &element.properties {
+                places.push(self.property(property)?.ok_or_else(|| cut_short(element, index))?);
+            }
+            row(self, &places)?;
+        }
+        Ok(())
+    }
+}
+
+fn cut_short(element: &Element, found: u64) -> FormatError {
+    FormatError::truncated(format!("{} elements `{}`", element.count, element.name), found.to_string())
+}
+
+/// The points of a PLY file.
+pub(super) fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+    let header = Header::parse(bytes)?;
+    let (mut cursor, element, last) = Cursor::at_vertices(bytes, &header)?;
+    let axes = element
+        .triple(["x", "y", "z"])
+        .ok_or_else(|| FormatError::Content("the element `vertex` lacks x, y or z".into()))?;
+    let kinds = axes.map(|axis| element.properties[axis].scalar);
+    let mut points = Vec::new();
+    match (header.encoding, element.stride()) {
+        (Encoding::Binary { big_endian }, Some(stride)) => {
+            let body = &bytes[cursor.at..];
+            let count = usize::try_from(element.count).unwrap_or(usize::MAX);
+            if count > body.len() / stride {
+                return Err(cut_short(element, (body.len() / stride) as u64));
+            }
+            let offset = |axis: usize| element.properties[..axis].iter().map(|p| p.scalar.size()).sum();
+            let offsets: [usize; 3] = axes.map(offset);
+            let number = |row: &[u8], i: usize| kinds[i].get(row, offsets[i], big_endian).unwrap_or(f64::NAN);
+            let rows = body.chunks_exact(stride).take(count);
+            points.extend(rows.map(|row| [number(row, 0), number(row, 1), number(row, 2)]));
+            cursor.at += count * stride;
+        }
+        (_, _) => {
+            // The count is not trusted with memory: a number takes a byte or more.
+            let most = (bytes.len() - cursor.at) / element.properties.len();
+            points.reserve(most.min(usize::try_from(element.count).unwrap_or(usize::MAX)));
+            cursor.rows(element, |cursor, places| {
+                let value = |i: usize| cursor.value(&places[axes[i]], kinds[i]);
+                points.push([value(0)?, value(1)?, value(2)?]);
+                Ok(())
+            })?;
+        }
+    }
+    if last && element.properties.iter().all(|p| matches!(cursor.property(p), Ok(Some(_)))) {
+        let problem = format!(
+            "{} elements `vertex` announced, but more rows follow; correct the count in the header",
+            element.count
+        );
+        return Err(FormatError::Content(problem));
+    }
+    Ok(points)
+}

@@ -1,0 +1,157 @@
+//! PLY, the Stanford polygon format: text, and binary of both byte orders.
+
+mod body;
+mod header;
+mod rewrite;
+
+use std::io::{self, Write};
+
+use super::{CloudFormat, FormatError};
+use crate::Rigid;
+
+/// PLY files; the points are the `x`, `y` and `z` of the element `vertex`, whatever else it and the
+/// other elements hold. Written as binary little endian in double precision. A moved copy keeps
+/// faces, colours and all other properties as they are; normals (`nx`, `ny`, `nz`) are turned.
+pub(super) struct Ply;
+
+impl CloudFormat for Ply {
+    fn name(&self) -> &'static str {
+        "ply"
+    }
+
+    fn extensions(&self) -> &[&'static str] {
+        &["ply"]
+    }
+
+    fn recognises(&self, bytes: &[u8]) -> bool {
+        bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r")
+    }
+
+    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+        body::read(bytes)
+    }
+
+    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
+        let axes = "property double x\nproperty double y\nproperty double z";
+        let count = points.len();
+        write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{axes}\nend_header\n")?;
+        points.iter().flatten().try_for_each(|c| out.write_all(&c.to_le_bytes()))
+    }
+
+    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
+        rewrite::rewrite(bytes, motion, out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const POINTS: [[f64; 3]; 2] = [[1.5, -2.0, 0.25], [4.0, 5.0, -6.5]];
+
+    fn header(format: &str) -> String {
+        format!(
+            "ply\r\nformat {format} 1.0\ncomment a face before the vertices\nelement face 1\n\
+             property list uchar short vertex_indices\nelement vertex 2\nproperty uchar red\n\
+             property float y\nproperty float x\nproperty double z\nelement edge 9\nproperty int a\nend_header\n"
+        )
+    }
+
+    fn binary(big_endian: bool) -> Vec<u8> {
+        let mut bytes =
+            header(if big_endian { "binary_big_endian" } else { "binary_little_endian" }).into_bytes();
+        let mut put = |value: &[u8]| {
+            let mut value = value.to_vec();
+            if big_endian {
+                value.reverse();
+            }
+            bytes.extend(value);
+        };
+        put(&[3]);
+        (0i16..3).for_each(|i| put(&i.to_le_bytes()));
+        for [x, y, z] in POINTS {
+            put(&[200]);
+            put(&(y as f32).to_le_bytes());
+            put(&(x as f32).to_le_bytes());
+            put(&z.to_le_bytes());
+        }
+        bytes
+    }
+
+    #[test]
+    fn three_encodings() {
+        let text = format!("{}3 0 1 2\n200 -2 1.5 0.25\n200 5 4\n -6.5\n", header("ascii"));
+        assert_eq!(Ply.read(text.as_bytes()).unwrap(), POINTS);
+        assert_eq!(Ply.read(&binary(false)).unwrap(), POINTS);
+        assert_eq!(Ply.read(&binary(true)).unwrap(), POINTS);
+    }
+
+    #[test]
+    fn files_cut_short() {
+        for big_endian in [false, true] {
+            let whole = binary(big_endian);
+            for length in 0..whole.len() {
+                assert!(Ply.read(&whole[..length]).is_err(), "{length}");
+            }
+        }
+        let error = Ply.read(&binary(false)[..binary(false).len() - 1]).unwrap_err().to_string();
+        assert!(error.contains("2 elements `vertex` announced, 1 found"), "{error}");
+    }
+
+    #[test]
+    fn headers_that_lie() {
+        let head = |body: &str| format!("ply\nformat binary_little_endian 1.0\n{body}\nend_header\n");
+        let error = |body: &str| Ply.read(head(body).as_bytes()).unwrap_err().to_string();
+        let axes = "property float x\nproperty float y\nproperty float z";
+        assert!(error(&format!("element vertex 18446744073709551615\n{axes}")).contains("cut short"));
+        assert!(error(&format!("element vertex -3\n{axes}")).contains("line 3"));
+        assert!(error("element vertex 3\nproperty float x\nproperty float y").contains("lacks"));
+        assert!(error("element face 0\nproperty list uchar int i").contains("no element `vertex`"));
+        assert!(error("property float x").contains("line 3"));
+        assert!(error("element vertex 3\nproperty quad x").contains("line 4: \"quad\" is not a type"));
+        // Rows without properties would be free of bytes: they are passed over.
+        assert!(
+            error(&format!("element ghost 18446744073709551615\nelement vertex 9\n{axes}")).contains("cut")
+        );
+        assert!(Ply.read(b"solid").is_err() && Ply.read(b"").is_err());
+        assert!(Ply.read(b"ply\nelement vertex 0\nend_header\n").is_err());
+    }
+
+    #[test]
+    fn a_moved_copy_keeps_the_rest() {
+        let motion = Rigid {
+            rotation: nalgebra::Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+            translation: [0.25, 1e6 + 0.1, 0.0].into(),
+        };
+        let copy = |bytes: &[u8], motion: &Rigid| {
+            let mut out = Vec::new();
+            Ply.rewrite(bytes, motion, &mut out).unwrap();
+            out
+        };
+        let text = "ply\r\nformat ascii 1.0\nelement vertex 2\nproperty float nz\nproperty float x\nproperty float ny\n\
+                    property float y\nproperty uchar red\nproperty float nx\nproperty int z\nelement face 1\n\
+                    property list uchar int vertex_indices\nend_header\n0 1.50 0 -2 7 1.0 3\r\n1 nan 0 5 8  0 9\n2 0 1\n";
+        let expected =
+            text.replace("float y", "double y").replace("0 1.50 0 -2 7 1.0 3", "0 2.25 1 1000001.6 7 0 3");
+        assert_eq!(String::from_utf8(copy(text.as_bytes(), &motion)).unwrap(), expected);
+        for bytes in [binary(false), binary(true)] {
+            assert_eq!(copy(&bytes, &Rigid::identity()), bytes);
+            let moved = copy(&bytes, &motion);
+            assert_eq!(Ply.read(&moved).unwrap(), POINTS.map(|p| motion.apply(&p)));
+            // y became a double in each of two rows; the word `double` is longer by one letter.
+            assert_eq!(moved.len(), bytes.len() + 2 * 4 + 1);
+            assert_eq!(copy(&moved, &motion.inverse()).len(), moved.len());
+        }
+    }
+
+    #[test]
+    fn rows_that_are_too_many() {
+        let text = format!("{}3 0 1 2\n200 -2 1.5 0.25\n200 5 4 -6.5\n", header("ascii"));
+        let (start, end) = text.split_once("element edge").unwrap();
+        let body = end.split_once("end_header\n").unwrap().1;
+        let only = format!("{start}end_header\n{body}");
+        assert_eq!(Ply.read(only.as_bytes()).unwrap(), POINTS);
+        let error = Ply.read(format!("{only}200 5 4 -6.5\n").as_bytes()).unwrap_err().to_string();
+        assert!(error.contains("more rows follow"), "{error}");
+    }
+}
