@@ -2,14 +2,14 @@
 # Times a training step and the forward pass of this crate and of the same network in PyTorch, by turns,
 # and prints one table (Markdown). See docs/speed.md.
 #
-#   scripts/compare-speed.sh [--rounds 5] [--repeats 7] [--threads 2] [--config configs/modelnet-small.toml]
+#   scripts/compare-speed.sh [--rounds 7] [--repeats 5] [--threads 2] [--config configs/modelnet-small.toml]
 #
 # Needs cargo and python3 (3.11 or newer). Where python3 has no torch, it is installed from PyPI into a
 # virtual environment outside the checkout (${XDG_CACHE_HOME:-~/.cache}/srrf-speed).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-rounds=5 repeats=7 threads=2 config=configs/modelnet-small.toml
+rounds=7 repeats=5 threads=2 config=configs/modelnet-small.toml
 while [ $# -gt 0 ]; do
     case "$1" in
     --rounds) rounds=$2 ;;
@@ -71,6 +71,13 @@ def value(side, figure, key, take):
     return take(result[key] for result in found[side, figure])
 
 
+def ratio(figure):
+    """Median over the rounds, each of which saw the same load on both sides; then that of the least times."""
+    pairs = zip(found["ours", figure], found["torch", figure])
+    middle = statistics.median(ours["median_s"] / torch["median_s"] for ours, torch in pairs)
+    return f"{middle:.2f} ({value('ours', figure, 'min_s', min) / value('torch', figure, 'min_s', min):.2f})"
+
+
 def machine():
     try:
         with open("/proc/cpuinfo") as file:
@@ -94,10 +101,8 @@ for figure, name in FIGURES.items():
     for side in ("ours", "torch", "bf16"):
         if (side, figure) in found:
             middle, least = value(side, figure, "median_s", statistics.median), value(side, figure, "min_s", min)
-            cells[side] = (middle, least, f"{middle * 1e3:.1f} ({least * 1e3:.1f})")
-    ours, torch_ = cells["ours"], cells["torch"]
-    bf16 = cells["bf16"][2] if "bf16" in cells else ""
-    print(f"| {name} | {ours[2]} | {torch_[2]} | {ours[0] / torch_[0]:.2f} ({ours[1] / torch_[1]:.2f}) | {bf16} |")
+            cells[side] = f"{middle * 1e3:.1f} ({least * 1e3:.1f})"
+    print(f"| {name} | {cells['ours']} | {cells['torch']} | {ratio(figure)} | {cells.get('bf16', '')} |")
 print("\n| peak memory, MiB (above what the process held before the first step) | ours | PyTorch f32 | ratio |")
 print("|---|---|---|---|")
 for figure, name in FIGURES.items():
@@ -107,6 +112,6 @@ for figure, name in FIGURES.items():
     for side in ("ours", "torch"):
         peak, start = (value(side, figure, key, statistics.median) for key in ("peak_mib", "start_mib"))
         cells.append((peak, peak - start, f"{peak:.0f} ({peak - start:.0f})"))
-    ratio = f"{cells[0][0] / cells[1][0]:.2f} ({cells[0][1] / cells[1][1]:.2f})"
-    print(f"| {name} | {cells[0][2]} | {cells[1][2]} | {ratio} |")
+    share = f"{cells[0][0] / cells[1][0]:.2f} ({cells[0][1] / cells[1][1]:.2f})"
+    print(f"| {name} | {cells[0][2]} | {cells[1][2]} | {share} |")
 PY
