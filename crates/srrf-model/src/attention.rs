@@ -2,8 +2,9 @@
 
 use burn::module::Module;
 use burn::nn::{LayerNorm, LayerNormConfig, Linear, LinearConfig};
-use burn::tensor::activation::{relu, softmax};
 use burn::tensor::{Device, Tensor};
+
+use crate::fast::{Activation, add_norm, attention, linear};
 
 /// Multi-head attention: `Concat(A_1 .. A_h) W^O`, each `A_i = softmax(Q K^T / sqrt(d_K)) V`
 /// (the paper's MA and Att).
@@ -30,21 +31,22 @@ impl MultiHeadAttention {
     /// - `queries`: `[clouds, n, width]`, `memory`: `[clouds, m, width]`
     /// - output: `[clouds, n, width]`
     pub fn forward(&self, queries: Tensor<3>, memory: Tensor<3>) -> Tensor<3> {
-        let [clouds, n, width] = queries.dims();
-        let [_, m, _] = memory.dims();
-        let per_head = width / self.heads;
-
-        let q = self.query.forward(queries) / (per_head as f64).sqrt();
-        let q = q.reshape([clouds, n, self.heads, per_head]).swap_dims(1, 2); // [clouds, heads, n, d]
-        let kv =
-            self.key_value.forward(memory).reshape([clouds, m, 2 * self.heads, per_head]).swap_dims(1, 2);
-        let k = kv.clone().narrow(1, 0, self.heads); // [clouds, heads, m, d]
-        let v = kv.narrow(1, self.heads, self.heads);
-
-        let weights = softmax(q.matmul(k.transpose()), 3); // [clouds, heads, n, m]
-        let mixed = weights.matmul(v).swap_dims(1, 2).reshape([clouds, n, width]);
-        self.output.forward(mixed)
+        let dims = queries.dims();
+        self.rows(rows(queries), rows(memory), dims[0]).reshape(dims)
     }
+
+    /// The same on the rows of all clouds together: `[clouds * n, width]`.
+    fn rows(&self, queries: Tensor<2>, memory: Tensor<2>, clouds: usize) -> Tensor<2> {
+        let q = linear(&self.query, queries, Activation::None);
+        let kv = linear(&self.key_value, memory, Activation::None);
+        linear(&self.output, attention(q, kv, clouds, self.heads), Activation::None)
+    }
+}
+
+/// The points of all clouds as rows: `[clouds, n, width]` to `[clouds * n, width]`.
+fn rows(x: Tensor<3>) -> Tensor<2> {
+    let [clouds, n, width] = x.dims();
+    x.reshape([clouds * n, width])
 }
 
 /// Two linear layers with a ReLU between them.
@@ -64,9 +66,9 @@ impl FeedForward {
     }
 
     /// # Shapes
-    /// - `x` and output: `[clouds, n, width]`
-    pub fn forward(&self, x: Tensor<3>) -> Tensor<3> {
-        self.outer.forward(relu(self.inner.forward(x)))
+    /// - `x` and output: `[rows, width]`
+    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
+        linear(&self.outer, linear(&self.inner, x, Activation::Relu), Activation::None)
     }
 }
 
@@ -93,8 +95,10 @@ impl EncoderLayer {
     /// # Shapes
     /// - `x` and output: `[clouds, n, width]`
     pub fn forward(&self, x: Tensor<3>) -> Tensor<3> {
-        let x = self.attention_norm.forward(self.attention.forward(x.clone(), x.clone()) + x);
-        self.mlp_norm.forward(self.mlp.forward(x.clone()) + x)
+        let dims = x.dims();
+        let x = rows(x);
+        let x = add_norm(&self.attention_norm, self.attention.rows(x.clone(), x.clone(), dims[0]), x);
+        add_norm(&self.mlp_norm, self.mlp.forward(x.clone()), x).reshape(dims)
     }
 }
 
@@ -126,8 +130,10 @@ impl DecoderLayer {
     /// # Shapes
     /// - `x` and output: `[clouds, n, width]`, `memory`: `[clouds, m, width]`
     pub fn forward(&self, x: Tensor<3>, memory: Tensor<3>) -> Tensor<3> {
-        let x = self.self_norm.forward(self.self_attention.forward(x.clone(), x.clone()) + x);
-        let x = self.cross_norm.forward(self.cross_attention.forward(x.clone(), memory) + x);
-        self.mlp_norm.forward(self.mlp.forward(x.clone()) + x)
+        let dims = x.dims();
+        let (x, memory) = (rows(x), rows(memory));
+        let x = add_norm(&self.self_norm, self.self_attention.rows(x.clone(), x.clone(), dims[0]), x);
+        let x = add_norm(&self.cross_norm, self.cross_attention.rows(x.clone(), memory, dims[0]), x);
+        add_norm(&self.mlp_norm, self.mlp.forward(x.clone()), x).reshape(dims)
     }
 }

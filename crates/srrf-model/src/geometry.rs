@@ -7,6 +7,8 @@
 
 use burn::tensor::{Int, Tensor, TensorData};
 
+use crate::fast::vectorized;
+
 /// A batch of clouds copied to the host: shape `[batch, points, 3]`.
 #[derive(Debug, Clone)]
 pub struct HostClouds {
@@ -31,6 +33,71 @@ impl HostClouds {
     /// The clouds at the rows `indices` (as [`flat_indices`] numbers them), `per_cloud` rows each.
     pub fn select(&self, indices: &[i64], per_cloud: usize) -> Self {
         Self { points: indices.iter().map(|&i| self.points[i as usize]).collect(), per_cloud }
+    }
+}
+
+/// A cloud by coordinates, so that distances to all of it vectorise. Filled up to whole groups of
+/// [`LANES`] times [`LANES`] by points at infinity. Point `g L^2 + r L + l` is in lane `l` of group `g`.
+struct Columns {
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
+}
+
+/// Numbers that are handled at a time: a 512-bit vector.
+const LANES: usize = 16;
+
+impl Columns {
+    fn new(points: impl ExactSizeIterator<Item = [f32; 3]>) -> Self {
+        let padded = points.len().next_multiple_of(LANES * LANES);
+        let mut columns = Self {
+            x: Vec::with_capacity(padded),
+            y: Vec::with_capacity(padded),
+            z: Vec::with_capacity(padded),
+        };
+        for [x, y, z] in points {
+            columns.x.push(x);
+            columns.y.push(y);
+            columns.z.push(z);
+        }
+        for column in [&mut columns.x, &mut columns.y, &mut columns.z] {
+            column.resize(padded, f32::INFINITY);
+        }
+        columns
+    }
+
+    /// Squared distance of every point to `query`, into `out`, and the smallest of each lane of each
+    /// group into `least`.
+    #[inline(always)]
+    fn squared(&self, query: &[f32; 3], out: &mut [f32], least: &mut [f32]) {
+        const GROUP: usize = LANES * LANES;
+        let groups = out.chunks_exact_mut(GROUP).zip(least.chunks_exact_mut(LANES));
+        let columns =
+            self.x.chunks_exact(GROUP).zip(self.y.chunks_exact(GROUP)).zip(self.z.chunks_exact(GROUP));
+        for ((out, least), ((x, y), z)) in groups.zip(columns) {
+            let mut smallest = [f32::INFINITY; LANES];
+            let rows = x.chunks_exact(LANES).zip(y.chunks_exact(LANES)).zip(z.chunks_exact(LANES));
+            for (out, ((x, y), z)) in out.chunks_exact_mut(LANES).zip(rows) {
+                for ((((o, s), x), y), z) in out.iter_mut().zip(&mut smallest).zip(x).zip(y).zip(z) {
+                    let (dx, dy, dz) = (query[0] - x, query[1] - y, query[2] - z);
+                    let d = dx * dx + dy * dy + dz * dz;
+                    *o = d;
+                    *s = if d < *s { d } else { *s };
+                }
+            }
+            least.copy_from_slice(&smallest);
+        }
+    }
+
+    /// The points of entry `i` of `least`.
+    fn lane(i: usize) -> impl Iterator<Item = usize> {
+        let (group, lane) = (i / LANES, i % LANES);
+        (0..LANES).map(move |r| group * LANES * LANES + r * LANES + lane)
+    }
+
+    /// Room for [`Self::squared`].
+    fn buffers(&self) -> (Vec<f32>, Vec<f32>) {
+        (vec![0.0; self.x.len()], vec![0.0; self.x.len() / LANES])
     }
 }
 
@@ -61,23 +128,32 @@ pub fn flat_indices<'a>(
 /// neighbourhoods of half the size. Where there are fewer than `k` they are repeated in turn.
 pub fn k_nearest(queries: &[[f32; 3]], support: &[[f32; 3]], k: usize) -> Vec<u32> {
     let kept = distinct(support);
-    let support: Vec<[f32; 3]> = kept.iter().map(|&i| support[i as usize]).collect();
-    let found = k.min(support.len());
+    let columns = Columns::new(kept.iter().map(|&i| support[i as usize]));
+    let found = k.min(kept.len());
     let mut out = Vec::with_capacity(queries.len() * k);
     let mut best: Vec<(f32, u32)> = Vec::with_capacity(found + 1);
-    let mut distances = vec![0.0_f32; support.len()];
+    let (mut distances, mut least) = columns.buffers();
     for query in queries {
-        for (d, p) in distances.iter_mut().zip(&support) {
-            *d = squared(query, p);
-        }
+        vectorized(
+            #[inline(always)]
+            || columns.squared(query, &mut distances, &mut least),
+        );
         best.clear();
-        let mut worst = f32::INFINITY;
-        for (j, &d) in distances.iter().enumerate() {
-            if best.len() < found || d < worst {
-                let at = best.partition_point(|&(other, _)| other <= d);
-                best.insert(at, (d, j as u32));
-                best.truncate(found);
-                worst = best.last().map_or(f32::INFINITY, |&(d, _)| d);
+        let mut worst = (f32::INFINITY, u32::MAX);
+        for (i, &least) in least.iter().enumerate() {
+            if least > worst.0 {
+                continue;
+            }
+            for j in Columns::lane(i).take_while(|&j| j < kept.len()) {
+                let candidate = (distances[j], j as u32);
+                if candidate < worst {
+                    let at = best.partition_point(|other| *other < candidate);
+                    best.insert(at, candidate);
+                    if best.len() >= found {
+                        best.truncate(found);
+                        worst = best[found - 1];
+                    }
+                }
             }
         }
         out.extend((0..k).map(|j| kept[best[j % found].1 as usize]));
@@ -97,26 +173,31 @@ fn distinct(points: &[[f32; 3]]) -> Vec<u32> {
 
 /// The nearest point of `support` for each of `queries`: `queries` indices, ties to the first.
 pub fn nearest(queries: &[[f32; 3]], support: &[[f32; 3]]) -> Vec<u32> {
-    let mut distances = vec![0.0_f32; support.len()];
-    queries
-        .iter()
-        .map(|query| {
-            let mut least = f32::INFINITY;
-            for (d, p) in distances.iter_mut().zip(support) {
-                *d = squared(query, p);
-                least = least.min(*d);
-            }
-            distances.iter().position(|&d| d == least).unwrap_or(0) as u32
-        })
-        .collect()
+    let columns = Columns::new(support.iter().copied());
+    let (mut distances, mut least) = columns.buffers();
+    let mut find = |query: &[f32; 3]| {
+        vectorized(
+            #[inline(always)]
+            || columns.squared(query, &mut distances, &mut least),
+        );
+        let smallest = least.iter().fold(f32::INFINITY, |a, &d| a.min(d));
+        distances.iter().position(|&d| d == smallest).unwrap_or(0).min(support.len() - 1) as u32
+    };
+    queries.iter().map(&mut find).collect()
 }
 
 /// Share of `points` whose nearest neighbour in `support` is closer than `radius`.
 pub fn share_within(points: &[[f32; 3]], support: &[[f32; 3]], radius: f32) -> f64 {
-    let hits = points
-        .iter()
-        .filter(|p| support.iter().fold(f32::INFINITY, |least, q| least.min(squared(p, q))) < radius * radius)
-        .count();
+    let columns = Columns::new(support.iter().copied());
+    let (mut distances, mut least) = columns.buffers();
+    let mut is_near = |point: &&[f32; 3]| {
+        vectorized(
+            #[inline(always)]
+            || columns.squared(point, &mut distances, &mut least),
+        );
+        least.iter().any(|&d| d < radius * radius)
+    };
+    let hits = points.iter().filter(|p| is_near(p)).count();
     hits as f64 / points.len().max(1) as f64
 }
 
@@ -130,24 +211,32 @@ pub fn farthest_points(points: &[[f32; 3]], count: usize) -> Vec<u32> {
             mean[c] += p[c] / n as f32;
         }
     }
-    let farthest = |distances: &[f32]| {
-        let mut best = 0;
-        for (i, &d) in distances.iter().enumerate() {
-            if d > distances[best] {
-                best = i;
-            }
-        }
-        best
-    };
+    let first_of = |distances: &[f32], value: f32| distances.iter().position(|&d| d == value).unwrap_or(0);
     let to_mean: Vec<f32> = points.iter().map(|p| squared(p, &mean)).collect();
-    let mut chosen = vec![farthest(&to_mean) as u32];
-    let mut distances = vec![f32::INFINITY; n];
+    let top = to_mean.iter().fold(0.0_f32, |a, &d| a.max(d));
+    let mut chosen = vec![first_of(&to_mean, top) as u32];
+    let columns = Columns::new(points.iter().copied());
+    let (mut distances, mut least) = columns.buffers();
+    // To the nearest chosen point; the filling lies at distance 0 and is never chosen.
+    let mut to_chosen = vec![f32::INFINITY; distances.len()];
+    to_chosen[n..].fill(0.0);
     while chosen.len() < count.min(n) {
         let last = points[chosen[chosen.len() - 1] as usize];
-        for (d, p) in distances.iter_mut().zip(points) {
-            *d = d.min(squared(p, &last));
-        }
-        chosen.push(farthest(&distances) as u32);
+        let top = vectorized(
+            #[inline(always)]
+            || {
+                columns.squared(&last, &mut distances, &mut least);
+                let mut top = [0.0_f32; LANES];
+                for (c, d) in to_chosen.chunks_exact_mut(LANES).zip(distances.chunks_exact(LANES)) {
+                    for ((c, &d), top) in c.iter_mut().zip(d).zip(&mut top) {
+                        *c = if d < *c { d } else { *c };
+                        *top = if *c > *top { *c } else { *top };
+                    }
+                }
+                top.iter().fold(0.0_f32, |a, &d| a.max(d))
+            },
+        );
+        chosen.push(first_of(&to_chosen[..n], top) as u32);
     }
     (0..count).map(|i| chosen[i % chosen.len()]).collect()
 }

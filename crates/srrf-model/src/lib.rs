@@ -13,6 +13,7 @@ mod branch;
 mod confidence;
 mod device;
 pub mod embedded;
+pub mod fast;
 pub mod geometry;
 pub mod init;
 mod integration;

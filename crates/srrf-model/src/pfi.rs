@@ -8,6 +8,7 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::attention::{DecoderLayer, EncoderLayer};
+use crate::fast::{Activation, linear};
 
 /// Sizes of the feature interaction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -66,10 +67,11 @@ impl Pfi {
     /// - `features`: `[clouds, n, width]`, `points`: `[clouds, n, 3]`, sources then targets
     /// - output: `[clouds, n, width]`
     pub fn forward(&self, features: Tensor<3>, points: Tensor<3>) -> Tensor<3> {
-        let [clouds, _, _] = features.dims();
+        let [clouds, n, width] = features.dims();
         // P = ReLU(FC(Sigmoid(FC(X)))).
-        let position = relu(self.position_outer.forward(sigmoid(self.position_inner.forward(points))));
-        let embedded = features.clone() + position;
+        let position = linear(&self.position_inner, points.reshape([clouds * n, 3]), Activation::Sigmoid);
+        let position = linear(&self.position_outer, position, Activation::Relu);
+        let embedded = features.clone() + position.reshape([clouds, n, width]);
 
         let memory = self.encoder.iter().fold(embedded.clone(), |x, block| block.forward(x));
         // Each cloud attends to the other one of its pair.

@@ -7,6 +7,7 @@ use burn::tensor::activation::{relu, softmax};
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
+use crate::fast::{Activation, gather_max, gather_relu, linear};
 use crate::geometry::{HostClouds, farthest_points, flat_indices, k_nearest, nearest, rows};
 
 /// Sizes of one set-abstraction level.
@@ -124,14 +125,17 @@ impl Sem {
         let [batch, n, channels] = features.dims();
 
         // The head sees each point's feature, the cloud's, and where the point is.
-        let global = relu(self.global.forward(features.clone())).max_dim(1); // [batch, 1, global]
-        let [_, _, global_width] = global.dims();
+        let flat = features.clone().reshape([batch * n, channels]);
+        let global = linear(&self.global, flat, Activation::Relu); // [batch * n, global]
+        let [_, global_width] = global.dims();
+        let all: Vec<i64> = (0..(batch * n) as i64).collect();
+        let global = gather_max(global, &all, n).reshape([batch, 1, global_width]);
         let mut x = Tensor::cat(vec![samples.clone(), features, global.expand([batch, n, global_width])], 2)
             .reshape([batch * n, 3 + channels + global_width]);
         for layer in &self.head {
-            x = relu(layer.norm.forward(layer.linear.forward(x)));
+            x = relu(layer.norm.forward(linear(&layer.linear, x, Activation::None)));
         }
-        let logits = self.weights.forward(x) * self.logit_scale; // [batch * n, skeleton_points]
+        let logits = linear(&self.weights, x, Activation::None) * self.logit_scale; // [batch * n, skeleton_points]
         let [_, skeleton_points] = logits.dims();
         let weights = softmax(logits.reshape([batch, n, skeleton_points]), 1); // sum_i W(i, j) = 1
 
@@ -194,16 +198,18 @@ impl Level {
         };
         let Some((first, others)) = self.mlp.split_first() else { return centres };
         let xyz_weight = first.weight.val().narrow(0, 0, 3); // the rows that act on x_j - x_i
-        let table = first.forward(input);
-        let [_, width] = table.dims();
-        let shift = centres.matmul(xyz_weight).unsqueeze_dim::<3>(1); // [samples, 1, width]
-        let grouped = rows(table, neighbours).reshape([samples, self.neighbours, width]);
-        let mut x = relu(grouped - shift).reshape([samples * self.neighbours, width]);
-        for layer in others {
-            x = relu(layer.forward(x));
+        let table = linear(first, input, Activation::None);
+        let shift = centres.matmul(xyz_weight); // [samples, width]
+        if others.is_empty() {
+            // max relu(t_j - s) = relu(max t_j - s): no need for a row for each neighbour.
+            return relu(gather_max(table, neighbours, self.neighbours) - shift);
         }
-        let [_, width] = x.dims();
-        x.reshape([samples, self.neighbours, width]).max_dim(1).squeeze_dim::<2>(1)
+        let mut x = gather_relu(table, shift, neighbours); // [samples * k, width]
+        for layer in others {
+            x = linear(layer, x, Activation::Relu);
+        }
+        let all: Vec<i64> = (0..(samples * self.neighbours) as i64).collect();
+        gather_max(x, &all, self.neighbours)
     }
 }
 

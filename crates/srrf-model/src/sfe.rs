@@ -8,6 +8,7 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::attention::EncoderLayer;
+use crate::fast::{Activation, linear};
 use crate::geometry::{HostClouds, flat_indices, k_nearest, rows};
 
 /// Sizes of the structural feature extractor.
@@ -91,7 +92,7 @@ impl Sfe {
             let [_, channels] = table.dims();
             // T'_n = Concat(T^1 .. T^k) over the neighbours.
             let joined = rows(table, indices).reshape([clouds * n, k * channels]);
-            let joined = layer.join.forward(joined); // [clouds * n, width]
+            let joined = linear(&layer.join, joined, Activation::None); // [clouds * n, width]
             let [_, width] = joined.dims();
             // That = LN(MSA(T') + T'), T_{n+1} = LN(MLP(That) + That).
             let features = layer.encoder.forward(joined.reshape([clouds, n, width]));

@@ -30,8 +30,8 @@ fn config() -> SrrfConfig {
             skeleton_points: 24,
             logit_scale: 5.0,
         },
-        dense: BranchConfig { tokens: 48, sfe: sfe(8), pfi: pfi.clone() },
-        skeleton: BranchConfig { tokens: 0, sfe: sfe(6), pfi },
+        dense: BranchConfig { tokens: 48, confidence: false, sfe: sfe(8), pfi: pfi.clone() },
+        skeleton: BranchConfig { tokens: 0, confidence: true, sfe: sfe(6), pfi },
         integration: IntegrationConfig {
             test: InlierTest::Nearest,
             dense_threshold: 0.05,

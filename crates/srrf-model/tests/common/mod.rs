@@ -89,11 +89,13 @@ pub fn tiny() -> SrrfConfig {
         },
         dense: BranchConfig {
             tokens: 29,
+            confidence: false,
             sfe: SfeConfig { layers: 2, neighbours: 7, width: 9, heads: 3, mlp: 13 },
             pfi: pfi(1),
         },
         skeleton: BranchConfig {
             tokens: 0,
+            confidence: false,
             sfe: SfeConfig { layers: 3, neighbours: 5, width: 15, heads: 5, mlp: 7 },
             pfi: pfi(2),
         },
