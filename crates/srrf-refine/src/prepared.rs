@@ -1,0 +1,108 @@
+//! [`Prepared`]: a cloud centred, thinned, indexed, with normals.
+
+use nalgebra::Vector3;
+use srrf_cloud::{CloudError, KnnIndex, PointCloud, Rigid, estimate_normals, spacing_of, voxel_downsample};
+
+use crate::RefineConfig;
+
+/// One resolution of a cloud.
+#[derive(Debug)]
+pub(crate) struct Level {
+    /// The centred points and their tree.
+    pub index: KnnIndex,
+    /// Unit normals, one a point.
+    pub normals: Vec<Vector3<f64>>,
+    /// Median distance to the nearest other point.
+    pub spacing: f64,
+}
+
+impl Level {
+    fn new(points: &[[f64; 3]], neighbours: usize) -> Result<Self, CloudError> {
+        let index = KnnIndex::new(points)?;
+        let normals = estimate_normals(points, neighbours)?.into_iter().map(Vector3::from).collect();
+        let spacing = spacing_of(&index);
+        Ok(Self { index, normals, spacing })
+    }
+
+    /// Shape `[n, 3]`.
+    pub fn points(&self) -> &[[f64; 3]] {
+        self.index.points()
+    }
+}
+
+/// A cloud made ready for refinement.
+#[derive(Debug)]
+pub(crate) struct Prepared {
+    /// Mean of the points, in the coordinates of the input; levels are relative to it.
+    pub centre: Vector3<f64>,
+    /// Root mean square distance of the points from the centre.
+    pub radius: f64,
+    /// Few points, for starts and first iterations; `None` where the cloud is small anyway.
+    coarse: Option<Level>,
+    fine: Level,
+}
+
+impl Prepared {
+    pub fn new(cloud: &PointCloud, config: &RefineConfig) -> Result<Self, CloudError> {
+        cloud.check_rotation_observable()?;
+        let centre = cloud.centroid();
+        let centred: Vec<[f64; 3]> =
+            cloud.points().iter().map(|p| (Vector3::from(*p) - centre).into()).collect();
+        let squares: f64 = centred.iter().map(|p| Vector3::from(*p).norm_squared()).sum();
+        let radius = (squares / centred.len() as f64).sqrt();
+        let centred = PointCloud::new(centred)?;
+        let level = |most| Level::new(thinned(&centred, most, radius).points(), config.normal_neighbours);
+        let fine = level(config.max_points)?;
+        let coarse = if fine.points().len() > config.coarse_points {
+            Some(level(config.coarse_points)?)
+        } else {
+            None
+        };
+        Ok(Self { centre, radius, coarse, fine })
+    }
+
+    pub fn coarse(&self) -> &Level {
+        self.coarse.as_ref().unwrap_or(&self.fine)
+    }
+
+    pub fn fine(&self) -> &Level {
+        &self.fine
+    }
+
+    pub fn has_coarse(&self) -> bool {
+        self.coarse.is_some()
+    }
+}
+
+/// The cloud itself if it has at most `most` points, or centroids of the smallest voxels, in steps
+/// of a quarter, that give no more.
+fn thinned(cloud: &PointCloud, most: usize, radius: f64) -> PointCloud {
+    if cloud.len() <= most {
+        return cloud.clone();
+    }
+    // A surface of this radius has about 4 pi (radius / size)^2 voxels.
+    let mut size = radius * (4.0 / most as f64).sqrt();
+    loop {
+        match voxel_downsample(cloud, size) {
+            Ok(thin) if thin.len() <= most => return thin,
+            // One huge voxel always suffices, so that the loop ends.
+            _ => size *= 1.25,
+        }
+    }
+}
+
+/// `pose` between the inputs as a pose between the centred clouds.
+pub(crate) fn to_local(pose: &Rigid, source: &Prepared, target: &Prepared) -> Rigid {
+    Rigid {
+        rotation: pose.rotation,
+        translation: pose.rotation * source.centre + pose.translation - target.centre,
+    }
+}
+
+/// The way back from [`to_local`].
+pub(crate) fn to_global(pose: &Rigid, source: &Prepared, target: &Prepared) -> Rigid {
+    Rigid {
+        rotation: pose.rotation,
+        translation: pose.translation + target.centre - pose.rotation * source.centre,
+    }
+}

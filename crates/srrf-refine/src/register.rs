@@ -1,0 +1,71 @@
+//! [`Refined`]: any method with a refinement behind it.
+
+use srrf_cloud::{Branch, PointCloud, Register, RegisterError, Registration, Rigid};
+
+use crate::{RefineConfig, RefineTarget};
+
+/// Registers with `inner`, then refines: its pose and the pose of each of its branches are the starts.
+///
+/// The branches of the answer are those of `inner`, and `unrefined`, its own pose.
+#[derive(Debug)]
+pub struct Refined<R> {
+    inner: R,
+    config: RefineConfig,
+    name: String,
+}
+
+impl<R: Register> Refined<R> {
+    /// `inner` with this refinement behind it, named `<inner>+refine`.
+    pub fn new(inner: R, config: RefineConfig) -> Self {
+        let name = format!("{}+refine", inner.name());
+        Self { inner, config, name }
+    }
+
+    /// The method in front.
+    pub fn inner(&self) -> &R {
+        &self.inner
+    }
+
+    fn refined(
+        &self,
+        found: Registration,
+        source: &PointCloud,
+        target: &PointCloud,
+    ) -> Result<Registration, RegisterError> {
+        let mut starts: Vec<(&str, Rigid)> = vec![("answer", found.target_from_source)];
+        starts.extend(found.branches.iter().map(|b| (b.name, b.target_from_source)));
+        let target = RefineTarget::new(target, &self.config)?;
+        let refined = target.refine(source, &starts)?;
+        let mut branches = found.branches;
+        branches.push(Branch {
+            name: "unrefined",
+            target_from_source: found.target_from_source,
+            inlier_ratio: refined.starts[0].support,
+        });
+        Ok(Registration {
+            target_from_source: refined.target_from_source,
+            converged: found.converged && refined.converged,
+            iterations: found.iterations + refined.iterations,
+            branches,
+            skeletons: found.skeletons,
+        })
+    }
+}
+
+impl<R: Register> Register for Refined<R> {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+        self.refined(self.inner.register(source, target)?, source, target)
+    }
+
+    fn register_batch(
+        &self,
+        pairs: &[(&PointCloud, &PointCloud)],
+    ) -> Vec<Result<Registration, RegisterError>> {
+        let found = self.inner.register_batch(pairs);
+        found.into_iter().zip(pairs).map(|(found, (s, t))| self.refined(found?, s, t)).collect()
+    }
+}

@@ -1,0 +1,72 @@
+//! The robust stage: nearest neighbours both ways under a Geman-McClure kernel whose scale shrinks.
+
+use srrf_cloud::Rigid;
+
+use crate::matching::{equations, median_distance, motion};
+use crate::prepared::Level;
+use crate::{Metric, RefineConfig};
+
+/// Where a stage ended.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stage {
+    pub pose: Rigid,
+    pub iterations: usize,
+    pub converged: bool,
+}
+
+/// How the kernel's scale runs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Schedule {
+    pub start: f64,
+    pub end: f64,
+    pub shrink: f64,
+    pub iterations: usize,
+    /// The first iterations look at every so many-th point.
+    pub first_stride: usize,
+}
+
+impl Schedule {
+    /// The schedule of `config` from the residuals at `pose`.
+    pub fn new(source: &Level, target: &Level, pose: &Rigid, radius: f64, config: &RefineConfig) -> Self {
+        let spacing = source.spacing.max(target.spacing);
+        let median = median_distance(source, target, pose);
+        let start = (config.start_residuals * median).max(2.0 * spacing).min((0.25 * radius).max(spacing));
+        let end = config.end_spacings * spacing;
+        Self { start, end, shrink: config.shrink, iterations: config.max_iterations, first_stride: 1 }
+    }
+}
+
+/// Runs from `pose`. The weight of a match with residual `r` at scale `s` is
+/// `(s^2 / (s^2 + r^2))^2` (Geman and McClure 1985; the kernel of KISS-ICP), `r` the distance of the
+/// two points whatever the metric.
+pub(crate) fn descend(
+    source: &Level,
+    target: &Level,
+    pose: &Rigid,
+    radius: f64,
+    metric: Metric,
+    schedule: &Schedule,
+    tolerance: f64,
+) -> Stage {
+    let (a, b) = metric.weights();
+    let mut stage = Stage { pose: *pose, iterations: 0, converged: false };
+    let mut scale = schedule.start;
+    while stage.iterations < schedule.iterations {
+        let stride = if scale > schedule.end { schedule.first_stride } else { 1 };
+        let squared = scale * scale;
+        let sums = equations(source, target, &stage.pose, stride, |m| {
+            let w = squared / (squared + (m.moved - m.fixed).norm_squared());
+            Some((a * w * w, b * w * w))
+        });
+        let Some(next) = sums.step(&stage.pose, radius) else { return stage };
+        let moved = motion(&stage.pose, &next, radius);
+        stage.pose = next;
+        stage.iterations += 1;
+        if scale <= schedule.end && moved < tolerance * radius {
+            stage.converged = true;
+            return stage;
+        }
+        scale = (scale * schedule.shrink).max(schedule.end);
+    }
+    stage
+}

@@ -1,0 +1,213 @@
+//! What every refinement must do, on built-in shapes.
+
+use nalgebra::{Matrix6, Vector3};
+use srrf_cloud::shapes::ProceduralShapes;
+use srrf_cloud::{CloudError, EulerXyz, PointCloud, Register, RegisterError, Registration, Rigid};
+use srrf_corrupt::{CorruptionKind, Pair, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream};
+use srrf_refine::{RefineConfig, RefineError, RefineTarget, Refined, Verdict, refine};
+
+fn motion(angles_deg: [f64; 3], translation: [f64; 3]) -> Rigid {
+    Rigid { rotation: EulerXyz::from_deg(angles_deg).to_matrix(), translation: translation.into() }
+}
+
+fn pair(kind: CorruptionKind, severity: u8, points: usize, item: u64) -> Pair {
+    let shapes = ProceduralShapes::new(11, 9, None).unwrap();
+    let synthesizer = PairSynthesizer::new(PairConfig { points, ..PairConfig::default() }).unwrap();
+    let corruption = Some((kind, Severity::try_from(severity).unwrap()));
+    let stream = Stream { seed: 5, item };
+    synthesizer.pair(&shapes, item as usize % 9, corruption, PoseDraw::Seeded, stream).unwrap()
+}
+
+/// The true pose, off by 5 degrees and 0.02.
+fn off(pair: &Pair) -> Rigid {
+    pair.target_from_source.compose(&motion([3.0, -2.0, 3.5], [0.01, -0.015, 0.01]))
+}
+
+fn answer(source: &PointCloud, target: &PointCloud, start: Rigid) -> Rigid {
+    refine(source, target, &[("start", start)], &RefineConfig::default()).unwrap().target_from_source
+}
+
+fn distance(a: &Rigid, b: &Rigid) -> f64 {
+    (a.to_matrix4() - b.to_matrix4()).norm()
+}
+
+#[test]
+fn points_in_both_clouds_give_the_exact_pose() {
+    for (item, kind) in [CorruptionKind::Cutout, CorruptionKind::DensityDec, CorruptionKind::Background]
+        .into_iter()
+        .enumerate()
+    {
+        let pair = pair(kind, 3, 701, item as u64);
+        let found =
+            refine(&pair.source, &pair.target, &[("start", off(&pair))], &RefineConfig::default()).unwrap();
+        assert_eq!(found.verdict, Verdict::Rigid);
+        assert!(found.kept && distance(&found.target_from_source, &pair.target_from_source) < 2e-3, "{kind}");
+        let rotation = found.target_from_source.rotation;
+        assert!(
+            (rotation.determinant() - 1.0).abs() < 1e-9
+                && (rotation * rotation.transpose()).trace() < 3.0 + 1e-9
+        );
+        assert!(found.evidence.fitness > 0.6 && found.evidence.inlier_rmse < found.evidence.spacing);
+    }
+}
+
+#[test]
+fn soft_matches_average_noise_away() {
+    let hard = RefineConfig { soft: false, ..RefineConfig::default() };
+    let (mut with, mut without) = (0.0, 0.0);
+    for item in 0..6 {
+        let pair = pair(CorruptionKind::Gaussian, 4, 701, item);
+        let starts = [("start", off(&pair))];
+        let angle = |config: &RefineConfig| {
+            let found = refine(&pair.source, &pair.target, &starts, config).unwrap();
+            found.target_from_source.angle_to_deg(&pair.target_from_source)
+        };
+        with += angle(&RefineConfig::default()) / 6.0;
+        without += angle(&hard) / 6.0;
+    }
+    assert!(with < 0.75 * without && with < 1.0, "{with} against {without} degrees");
+}
+
+#[test]
+fn the_answer_follows_when_the_clouds_move() {
+    let pair = pair(CorruptionKind::Uniform, 2, 501, 3);
+    let plain = answer(&pair.source, &pair.target, off(&pair));
+    let (a, b) =
+        (motion([130.0, 40.0, -75.0], [3.0, 5.0, -2.0]), motion([-20.0, 80.0, 15.0], [4e5, -5e5, 10.0]));
+    let start = b.compose(&off(&pair)).compose(&a.inverse());
+    let moved = answer(&pair.source.transformed(&a), &pair.target.transformed(&b), start);
+    let back = b.inverse().compose(&moved).compose(&a);
+    assert!(distance(&back, &plain) < 1e-5, "{}", distance(&back, &plain));
+}
+
+#[test]
+fn neither_order_nor_threads_matter() {
+    let pair = pair(CorruptionKind::Impulse, 3, 6007, 2);
+    let config = RefineConfig { coarse_points: 1000, max_points: 5500, ..RefineConfig::default() };
+    let run = |source: &PointCloud, target: &PointCloud, threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let starts = [("start", off(&pair)), ("identity", Rigid::identity())];
+        pool.install(|| refine(source, target, &starts, &config).unwrap())
+    };
+    let one = run(&pair.source, &pair.target, 1);
+    assert_eq!(one, run(&pair.source, &pair.target, 3));
+    assert!(one.target_from_source.angle_to_deg(&pair.target_from_source) < 0.2);
+    assert!(one.evidence.source_points <= 5500 && one.evidence.source_points > 2000);
+
+    let shuffled =
+        |c: &PointCloud| PointCloud::new((0..6007).map(|i| c.points()[i * 100 % 6007]).collect()).unwrap();
+    let other = run(&shuffled(&pair.source), &shuffled(&pair.target), 2);
+    assert!(distance(&one.target_from_source, &other.target_from_source) < 1e-6);
+}
+
+#[test]
+fn the_better_start_wins() {
+    let pair = pair(CorruptionKind::DensityInc, 3, 701, 4);
+    let wrong = pair.target_from_source.compose(&motion([70.0, 30.0, -50.0], [0.2, 0.1, 0.0]));
+    let starts = [("wrong", wrong), ("near", off(&pair)), ("identity", Rigid::identity())];
+    let found = refine(&pair.source, &pair.target, &starts, &RefineConfig::default()).unwrap();
+    assert_eq!(found.start, "near");
+    assert!(found.starts[1].support > found.starts[0].support && found.starts.len() == 3);
+    assert!(distance(&found.target_from_source, &pair.target_from_source) < 2e-3);
+}
+
+#[test]
+fn deformation_is_told_from_noise() {
+    let config = RefineConfig::default();
+    for item in 0..4 {
+        for (kind, verdict) in
+            [(CorruptionKind::Shear, Verdict::Deformed), (CorruptionKind::Gaussian, Verdict::Rigid)]
+        {
+            let pair = pair(kind, 4, 1024, item);
+            let found =
+                refine(&pair.source, &pair.target, &[("true", pair.target_from_source)], &config).unwrap();
+            assert_eq!(found.verdict, verdict, "{kind} {item}: {:?}", found.residuals);
+        }
+    }
+}
+
+#[test]
+fn a_prepared_target_serves_many_sources() {
+    let pair = pair(CorruptionKind::Upsampling, 2, 501, 5);
+    let target = RefineTarget::new(&pair.target, &RefineConfig::default()).unwrap();
+    let frame = motion([30.0, 20.0, 50.0], [1.0, 2.0, 3.0]);
+    for move_source in [Rigid::identity(), frame] {
+        let source = pair.source.transformed(&move_source);
+        let start = off(&pair).compose(&move_source.inverse());
+        let found = target.refine(&source, &[("start", start)]).unwrap();
+        let expected = pair.target_from_source.compose(&move_source.inverse());
+        assert!(found.target_from_source.angle_to_deg(&expected) < 0.5);
+    }
+}
+
+#[test]
+fn information_is_the_sum_over_inliers() {
+    let pair = pair(CorruptionKind::Cutout, 1, 401, 6);
+    let target = &pair.source; // a cloud on itself: every point is its own match
+    let found = refine(target, target, &[("identity", Rigid::identity())], &RefineConfig::default()).unwrap();
+    assert_eq!((found.evidence.inliers, found.evidence.source_points), (401, 401));
+    assert_eq!((found.evidence.fitness, found.evidence.overlap_target), (1.0, 1.0));
+    let mut expected = Matrix6::zeros();
+    for p in target.points() {
+        let mut j = nalgebra::Matrix3x6::zeros();
+        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&-Vector3::from(*p).cross_matrix());
+        j.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
+        expected += j.transpose() * j;
+    }
+    assert!((found.evidence.information_at_origin() - expected).norm() < 1e-6 * expected.norm());
+    // About the mean, turning and shifting do not mix.
+    assert!(found.evidence.information.fixed_view::<3, 3>(0, 3).norm() < 1e-6 * expected.norm());
+}
+
+#[test]
+fn refuses_what_it_cannot_refine() {
+    let pair = pair(CorruptionKind::Cutout, 1, 101, 6);
+    let config = RefineConfig::default();
+    let line = PointCloud::new((0..9).map(|i| [f64::from(i), 0.0, 0.0]).collect()).unwrap();
+    let start = [("identity", Rigid::identity())];
+    assert_eq!(
+        refine(&line, &pair.target, &start, &config).unwrap_err(),
+        RefineError::Source(CloudError::Collinear)
+    );
+    assert_eq!(
+        refine(&pair.source, &line, &start, &config).unwrap_err(),
+        RefineError::Target(CloudError::Collinear)
+    );
+    assert_eq!(refine(&pair.source, &pair.target, &[], &config).unwrap_err(), RefineError::NoStart);
+    let broken = [("broken", Rigid { translation: Vector3::new(f64::NAN, 0.0, 0.0), ..Rigid::identity() })];
+    let error = refine(&pair.source, &pair.target, &broken, &config).unwrap_err();
+    assert!(error.to_string().contains("`broken`"));
+    assert!(matches!(RegisterError::from(error), RegisterError::NoPose(_)));
+    // Far away and tiny clouds: any answer, but no panic.
+    let far = motion([0.0; 3], [1e6, 0.0, 0.0]);
+    let tiny = PointCloud::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).unwrap();
+    assert!(refine(&tiny, &pair.target, &[("far", far)], &config).is_ok());
+    let flat =
+        PointCloud::new(vec![[1.0, 2.0, 0.0], [1.0, 2.0, 0.0], [2.0, 2.0, 0.0], [1.0, 3.0, 0.0]]).unwrap();
+    assert!(refine(&flat, &flat, &start, &config).unwrap().evidence.fitness > 0.99);
+}
+
+/// Answers the pose it was made with.
+struct Fixed(Rigid);
+
+impl Register for Fixed {
+    fn name(&self) -> &str {
+        "fixed"
+    }
+
+    fn register(&self, _: &PointCloud, _: &PointCloud) -> Result<Registration, RegisterError> {
+        Ok(Registration::from_pose(self.0))
+    }
+}
+
+#[test]
+fn refined_wraps_any_method() {
+    let pair = pair(CorruptionKind::Cutout, 2, 501, 1);
+    let method = Refined::new(Fixed(off(&pair)), RefineConfig::default());
+    assert_eq!(method.name(), "fixed+refine");
+    let found = method.register(&pair.source, &pair.target).unwrap();
+    assert!(distance(&found.target_from_source, &pair.target_from_source) < 2e-3);
+    assert_eq!((found.branches[0].name, found.branches[0].target_from_source), ("unrefined", off(&pair)));
+    let batch = method.register_batch(&[(&pair.source, &pair.target), (&pair.source, &pair.target)]);
+    assert_eq!(batch[1].as_ref().unwrap(), &found);
+}
