@@ -5,6 +5,9 @@ use rayon::prelude::*;
 
 use crate::{CloudError, KnnIndex};
 
+/// Clouds up to this size are done on the caller's thread.
+const SEQUENTIAL: usize = 4096;
+
 /// A unit normal for each of `points` (shape `[n, 3]` in and out): the direction in which its `k`
 /// nearest points, itself among them, vary least.
 ///
@@ -22,15 +25,18 @@ pub fn estimate_normals(points: &[[f64; 3]], k: usize) -> Result<Vec<[f64; 3]>, 
     }
     let index = KnnIndex::new(points)?;
     let mean = mean_of(points.iter());
-    Ok(points
-        .par_iter()
-        .map(|point| {
-            let neighbours = index.k_nearest(point, k.max(3));
-            let normal = least_direction(neighbours.iter().map(|&(i, _)| &points[i]));
-            let outward = normal.dot(&(Vector3::from(*point) - mean)) >= 0.0;
-            (if outward { normal } else { -normal }).into()
-        })
-        .collect())
+    let normal = |point: &[f64; 3]| -> [f64; 3] {
+        let neighbours = index.k_nearest(point, k.max(3));
+        let normal = least_direction(neighbours.iter().map(|&(i, _)| &points[i]));
+        let outward = normal.dot(&(Vector3::from(*point) - mean)) >= 0.0;
+        (if outward { normal } else { -normal }).into()
+    };
+    // Small clouds come by the thousand, and waking threads for each costs more than it gives.
+    Ok(if points.len() <= SEQUENTIAL {
+        points.iter().map(normal).collect()
+    } else {
+        points.par_iter().map(normal).collect()
+    })
 }
 
 fn mean_of<'a>(points: impl ExactSizeIterator<Item = &'a [f64; 3]>) -> Vector3<f64> {

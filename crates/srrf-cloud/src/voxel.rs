@@ -88,7 +88,7 @@ pub fn spacing_of(index: &KnnIndex) -> f64 {
         distinct(2).or_else(|| distinct(9))
     };
     let sample: Vec<&[f64; 3]> = index.points().iter().step_by(step).collect();
-    let mut squared: Vec<f64> = sample.par_iter().filter_map(|p| nearest(p)).collect();
+    let mut squared: Vec<f64> = sample.iter().filter_map(|p| nearest(p)).collect();
     if squared.is_empty() {
         return 0.0;
     }
