@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::scan::moved;
+use super::scan::{Splice, moved};
 use super::single::check_single;
 use super::{CloudFormat, FormatError};
 use crate::Rigid;
@@ -45,32 +45,31 @@ impl CloudFormat for Kitti {
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
         check_single(points, "KITTI .bin")?;
-        points.iter().try_for_each(|point| out.write_all(&record(point, [0; 4])))
+        let intensity = [0; 4];
+        points.iter().try_for_each(|point| {
+            point.iter().try_for_each(|&c| out.write_all(&(c as f32).to_le_bytes()))?;
+            out.write_all(&intensity)
+        })
     }
 
     fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-        let points: Vec<[f64; 3]> = self.read(bytes)?.into_iter().map(|p| moved(motion, p)).collect();
-        check_single(&points, "KITTI .bin")?;
-        for (point, old) in points.iter().zip(bytes.as_chunks::<RECORD>().0) {
-            out.write_all(&record(point, [old[12], old[13], old[14], old[15]]))?;
+        let old = self.read(bytes)?;
+        let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
+        check_single(&new, "KITTI .bin")?;
+        let mut splice = Splice::new(bytes, out);
+        for (index, (old, new)) in old.iter().zip(&new).enumerate() {
+            for axis in (0..3).filter(|&axis| old[axis] != new[axis] && !old[axis].is_nan()) {
+                let at = index * RECORD + axis * 4;
+                splice.replace(at..at + 4, &(new[axis] as f32).to_le_bytes())?;
+            }
         }
-        Ok(())
+        splice.finish()
     }
 }
 
 fn point(record: &[u8; RECORD]) -> [f64; 3] {
     let words = record.as_chunks::<4>().0;
     std::array::from_fn(|axis| f32::from_le_bytes(words[axis]).into())
-}
-
-fn record(point: &[f64; 3], intensity: [u8; 4]) -> [u8; RECORD] {
-    let words =
-        [(point[0] as f32).to_le_bytes(), (point[1] as f32).to_le_bytes(), (point[2] as f32).to_le_bytes()];
-    let mut bytes = [0; RECORD];
-    for (slot, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(words.iter().chain([&intensity])) {
-        *slot = *word;
-    }
-    bytes
 }
 
 #[cfg(test)]

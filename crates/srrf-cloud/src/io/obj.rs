@@ -121,7 +121,8 @@ impl CloudFormat for Obj {
                 Some((_, b"vn")) => turned,
                 _ => continue,
             };
-            let (places, old) = triple(&line)?;
+            // A damaged normal stays; the points have been read before.
+            let Ok((places, old)) = triple(&line) else { continue };
             splice.numbers(&places, old, turn(motion, old))?;
         }
         splice.finish()

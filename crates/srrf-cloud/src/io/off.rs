@@ -50,8 +50,10 @@ impl CloudFormat for Off {
             let (places, old) = triple(&line, 0)?;
             splice.numbers(&places, old, moved(motion, old))?;
             if header.normals {
-                let (places, old) = triple(&line, 3)?;
-                splice.numbers(&places, old, turned(motion, old))?;
+                // A damaged normal stays; the points have been read before.
+                if let Ok((places, old)) = triple(&line, 3) {
+                    splice.numbers(&places, old, turned(motion, old))?;
+                }
             }
         }
         splice.finish()

@@ -35,7 +35,8 @@ pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::
                 let columns = fields.map(|field| column(&header, field));
                 let mut old = Vec::new();
                 ascii_rows(bytes, &header, |line, words| {
-                    old.push(numbers(line, words, columns)?);
+                    // A damaged normal stays as it is.
+                    old.push(numbers(line, words, columns).unwrap_or([f64::NAN; 3]));
                     Ok::<_, FormatError>(())
                 })?;
                 changes.push(turn(&header, fields, old, motion));
@@ -47,7 +48,11 @@ pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::
             if let Some(fields) = normals {
                 changes.push(turn(&header, fields, table.triples(&header, fields), motion));
             }
-            Some(binary_body(&header, &table, &changes))
+            let body = binary_body(&header, &table, &changes);
+            if body == *table.bytes {
+                return out.write_all(bytes);
+            }
+            Some(if header.encoding == Encoding::Compressed { compressed(&body)? } else { body })
         }
     };
 
@@ -120,10 +125,15 @@ fn binary_body(header: &Header, table: &Table, changes: &[Change]) -> Vec<u8> {
         return out;
     }
     fields.for_each(|field| (0..header.points).for_each(|point| put(field, point, &mut out)));
-    let packed = lzf::compress(&out);
-    let mut body = Vec::with_capacity(packed.len() + 8);
-    body.extend_from_slice(&(packed.len() as u32).to_le_bytes());
-    body.extend_from_slice(&(out.len() as u32).to_le_bytes());
-    body.extend_from_slice(&packed);
-    body
+    out
+}
+
+/// The sizes before and after compression, and the compressed bytes.
+fn compressed(plain: &[u8]) -> Result<Vec<u8>, FormatError> {
+    let packed = lzf::compress(plain);
+    let (Ok(packed_size), Ok(size)) = (u32::try_from(packed.len()), u32::try_from(plain.len())) else {
+        let problem = format!("{} bytes are too many for a compressed PCD; write .ply", plain.len());
+        return Err(FormatError::Unwritable(problem));
+    };
+    Ok([&packed_size.to_le_bytes(), &size.to_le_bytes(), &packed[..]].concat())
 }

@@ -158,7 +158,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
             })?;
         }
     }
-    if last && element.properties.iter().all(|p| matches!(cursor.property(p), Ok(Some(_)))) {
+    // With lists, any bytes behind the rows could be read as one more.
+    let countable = header.encoding == Encoding::Ascii || element.stride().is_some();
+    if last && countable && element.properties.iter().all(|p| matches!(cursor.property(p), Ok(Some(_)))) {
         let problem = format!(
             "{} elements `vertex` announced, but more rows follow; correct the count in the header",
             element.count

@@ -58,8 +58,10 @@ pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::
         let Some((&new_point, &point)) = row.next().filter(|_| failed.is_ok()) else { return Ok(()) };
         let (old, new) = match normals {
             Some(normals) => {
-                let value = |i: usize| cursor.value(&places[normals[i]], scalar(normals[i]));
-                let normal = [value(0)?, value(1)?, value(2)?];
+                // A damaged normal stays as it is.
+                let value =
+                    |i: usize| cursor.value(&places[normals[i]], scalar(normals[i])).unwrap_or(f64::NAN);
+                let normal = [value(0), value(1), value(2)];
                 ([point, normal], [new_point, turned(motion, normal)])
             }
             None => ([point; 2], [new_point; 2]),
