@@ -3,9 +3,26 @@
 //!
 //! - [`Identity`]: moves nothing; the chance level.
 //! - [`Icp`]: iterative closest point, point to point.
+//! - [`IcpPlane`], [`IcpTrimmed`], [`IcpRobust`]: its variants with planes, with the nearest matches only, with
+//!   a robust kernel.
+//! - [`FpfhRansac`], [`Fgr`]: global methods, which need no start, with refinement behind them.
 
+mod correspond;
+mod fgr;
+mod fpfh;
+mod fpfh_ransac;
 mod icp;
+mod icp_loop;
+mod icp_plane;
+mod icp_robust;
+mod icp_trimmed;
 mod identity;
+mod ransac;
 
+pub use fgr::{Fgr, FgrConfig};
+pub use fpfh_ransac::{FpfhRansac, FpfhRansacConfig};
 pub use icp::{Icp, IcpConfig};
+pub use icp_plane::{IcpPlane, IcpPlaneConfig};
+pub use icp_robust::{IcpRobust, IcpRobustConfig};
+pub use icp_trimmed::{IcpTrimmed, IcpTrimmedConfig};
 pub use identity::Identity;
