@@ -1,5 +1,7 @@
 //! Broken files give an error or a right reading, never a panic, and take bounded memory.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "tests")]
+
 mod samples;
 
 use std::alloc::{GlobalAlloc, Layout, System};

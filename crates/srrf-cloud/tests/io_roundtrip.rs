@@ -1,5 +1,7 @@
 //! What is written reads back as the same bits, and a moved copy keeps all that it does not move.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "tests")]
+
 mod samples;
 
 use nalgebra::Rotation3;

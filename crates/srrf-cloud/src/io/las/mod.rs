@@ -33,7 +33,7 @@ impl CloudFormat for Las {
     }
 
     fn recognises(&self, bytes: &[u8]) -> bool {
-        bytes.starts_with(b"LASF") && !bytes.get(104).is_some_and(|format| format & 0x80 != 0)
+        bytes.starts_with(b"LASF") && bytes.get(104).is_none_or(|format| format & 0x80 == 0)
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {

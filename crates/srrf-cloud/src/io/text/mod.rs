@@ -117,12 +117,12 @@ fn parse<E: From<FormatError>>(
             columns = title.and_then(|title| named_columns(title.text, line.text)).unwrap_or(columns);
         }
         let row = Row::parse(line.text, columns).map_err(|problem| line.error(problem))?;
-        if let Some(count) = row.whole_numbers(line.text) {
-            if *whole.get_or_insert(count) != count {
-                let problem = "the number of fields changes: if the commas are decimal ones, write points \
-                               instead or separate the fields by semicolons";
-                return Err(line.error(problem).into());
-            }
+        if let Some(count) = row.whole_numbers(line.text)
+            && *whole.get_or_insert(count) != count
+        {
+            let problem = "the number of fields changes: if the commas are decimal ones, write points instead \
+                           or separate the fields by semicolons";
+            return Err(line.error(problem).into());
         }
         rows += 1;
         each(&line, row)?;
