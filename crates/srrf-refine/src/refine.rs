@@ -109,6 +109,15 @@ impl RefineTarget {
         &self.config
     }
 
+    /// What speaks for a pose as it is, without refinement.
+    ///
+    /// # Errors
+    /// [`RefineError::Source`] for a cloud that determines no rotation.
+    pub fn evidence(&self, source: &PointCloud, pose: &Rigid) -> Result<Evidence, RefineError> {
+        let source = Prepared::new(source, &self.config).map_err(RefineError::Source)?;
+        Ok(evidence(&source, &self.prepared, pose))
+    }
+
     /// Refines the best of `starts`: named poses that map `source` near the target.
     ///
     /// # Errors

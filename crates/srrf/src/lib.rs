@@ -1,0 +1,52 @@
+//! Registers two point clouds of any size, unit and place, and says whether it worked.
+//!
+//! ```
+//! use srrf_cloud::{EulerXyz, PointCloud, Rigid, shapes::ProceduralShapes, source::ShapeSource};
+//! use rand::{SeedableRng, rngs::ChaCha8Rng};
+//!
+//! let shapes = ProceduralShapes::new(7, 3, None)?;
+//! let source = shapes.sample(1, 2000, &mut ChaCha8Rng::seed_from_u64(1))?;
+//! let motion = Rigid { rotation: EulerXyz::from_deg([20.0, -15.0, 30.0]).to_matrix(), ..Rigid::identity() };
+//! let target = source.transformed(&motion);
+//!
+//! let found = srrf::register(&source, &target)?;
+//! assert!(found.target_from_source.angle_to_deg(&motion) < 0.1);
+//! assert!(!found.abstain);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! [`Registrar`] holds the options and the network, and serves many pairs; [`Registrar::prepare`] makes
+//! a target ready for many sources.
+//!
+//! Coordinates go in and come out in `f64`, in the unit and the frame of the input. Inside, both clouds
+//! are centred, so that map coordinates keep their last millimetre.
+
+mod frame;
+mod network;
+mod options;
+mod outcome;
+mod probability;
+mod registrar;
+mod starts;
+
+pub use options::{Method, Options, OptionsError, RotationRange};
+pub use outcome::{CoarsePose, Outcome, PointCounts, StageTime};
+pub use probability::{FEATURES, Features, Logistic};
+pub use registrar::{Error, Registrar, Target};
+
+use srrf_cloud::PointCloud;
+
+/// Registers `source` to `target` with the default options: `target ~ R source + t`.
+///
+/// The network is loaded on the first call and kept.
+///
+/// # Errors
+/// [`Error`] for clouds that determine no rotation (fewer than three points, all on one line), and where
+/// no pose is found.
+pub fn register(source: &PointCloud, target: &PointCloud) -> Result<Outcome, Error> {
+    static DEFAULT: std::sync::OnceLock<Result<Registrar, String>> = std::sync::OnceLock::new();
+    match DEFAULT.get_or_init(|| Registrar::new(Options::default()).map_err(|e| e.to_string())) {
+        Ok(registrar) => registrar.register(source, target),
+        Err(problem) => Err(Error::Setup(problem.clone())),
+    }
+}

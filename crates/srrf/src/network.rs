@@ -1,0 +1,85 @@
+//! The network as a source of starts.
+
+use std::path::Path;
+
+use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid, voxel_downsample};
+use srrf_model::{SrrfRegister, embedded, weights};
+
+/// Points of the cloud that the network chooses its 1,024 from: enough to look evenly over a scan.
+const THINNED: usize = 8192;
+
+/// A loaded network.
+#[derive(Debug)]
+pub struct Network {
+    register: SrrfRegister,
+    /// Name of the weights.
+    pub name: String,
+    /// SHA-256 of the weights.
+    pub sha256: String,
+}
+
+impl Network {
+    /// Loads weights: a file, or the name of a model in the program; the default if `None`.
+    ///
+    /// # Errors
+    /// In words, with the file and the way out.
+    pub fn load(from: Option<&str>, device: &str) -> Result<Self, String> {
+        let device = srrf_model::device(device).map_err(|e| e.to_string())?;
+        let loaded = match from {
+            None => embedded::load_default(&device),
+            Some(name) => match embedded::load(name, &device) {
+                Some(loaded) => loaded,
+                None if Path::new(name).exists() => weights::load(Path::new(name), &device),
+                None => {
+                    let known: Vec<&str> = embedded::names().collect();
+                    return Err(format!(
+                        "--weights {name}: no such file, and no model of that name in the program (it has {})",
+                        known.join(", ")
+                    ));
+                }
+            },
+        };
+        let loaded = loaded.map_err(|e| e.to_string())?;
+        let (name, sha256) = (loaded.name.clone(), loaded.sha256.clone());
+        Ok(Self { register: SrrfRegister::new(loaded, device), name, sha256 })
+    }
+
+    /// The network's poses after `start` has moved the source.
+    ///
+    /// # Errors
+    /// [`RegisterError`] for clouds that it cannot take.
+    pub fn from_start(
+        &self,
+        source: &PointCloud,
+        target: &PointCloud,
+        start: &Rigid,
+    ) -> Result<Registration, RegisterError> {
+        let mut found = self.register.register(&source.transformed(start), target)?;
+        found.target_from_source = found.target_from_source.compose(start);
+        for branch in &mut found.branches {
+            branch.target_from_source = branch.target_from_source.compose(start);
+        }
+        if let Some(skeletons) = &mut found.skeletons {
+            let back = start.inverse();
+            skeletons.source.iter_mut().for_each(|p| *p = back.apply(p));
+        }
+        Ok(found)
+    }
+}
+
+/// An even part of a large cloud: voxel centroids, [`THINNED`] or fewer. A cloud that is small already
+/// stays as it is.
+pub fn thinned(cloud: &PointCloud) -> PointCloud {
+    let mut thin = cloud.clone();
+    // A surface of radius r has about 4 pi (r / size)^2 voxels; the bounding sphere is larger than it.
+    let (_, frame) = cloud.to_unit_sphere();
+    let mut size = frame.radius * (4.0 / THINNED as f64).sqrt();
+    while thin.len() > THINNED {
+        match voxel_downsample(cloud, size) {
+            Ok(voxels) => thin = voxels,
+            Err(_) => return cloud.clone(), // the network's own subsample serves as well
+        }
+        size *= 1.25;
+    }
+    thin
+}

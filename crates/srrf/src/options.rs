@@ -1,0 +1,142 @@
+//! [`Options`]: what a user may want to change.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+use srrf_cloud::Rigid;
+use srrf_refine::RefineConfig;
+
+/// How starts for the refinement are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// The poses of the network, of FPFH with RANSAC, and the given one; the best supported wins.
+    #[default]
+    Auto,
+    /// The poses of the network only.
+    Srrf,
+    /// FPFH features with RANSAC only.
+    FpfhRansac,
+    /// Iterative closest point from the given pose.
+    Icp,
+    /// The given pose only (the identity, if none is given), refined.
+    Given,
+}
+
+impl Method {
+    /// All methods, the default first.
+    pub const ALL: [Self; 5] = [Self::Auto, Self::Srrf, Self::FpfhRansac, Self::Icp, Self::Given];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Srrf => "srrf",
+            Self::FpfhRansac => "fpfh-ransac",
+            Self::Icp => "icp",
+            Self::Given => "given",
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// An option that makes no sense.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum OptionsError {
+    /// No method of that name.
+    #[error("no method `{0}`; there are auto, srrf, fpfh-ransac, icp and given")]
+    Method(String),
+    /// No rotation range of that name.
+    #[error("rotation `{0}`: use 45 (the clouds are turned by less than that) or 180 (by anything)")]
+    Rotation(String),
+}
+
+impl FromStr for Method {
+    type Err = OptionsError;
+
+    fn from_str(name: &str) -> Result<Self, OptionsError> {
+        Self::ALL.into_iter().find(|m| m.name() == name).ok_or_else(|| OptionsError::Method(name.to_owned()))
+    }
+}
+
+/// How far the clouds may be turned against each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum RotationRange {
+    /// By up to about 45 degrees, the range that the network was trained for.
+    #[serde(rename = "45")]
+    Within45,
+    /// By anything: the network also sees the source in the 24 orientations of a cube.
+    #[default]
+    #[serde(rename = "180")]
+    Any,
+}
+
+impl FromStr for RotationRange {
+    type Err = OptionsError;
+
+    fn from_str(name: &str) -> Result<Self, OptionsError> {
+        match name {
+            "45" => Ok(Self::Within45),
+            "180" => Ok(Self::Any),
+            _ => Err(OptionsError::Rotation(name.to_owned())),
+        }
+    }
+}
+
+/// What a user may want to change.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// How starts are found. Default [`Method::Auto`].
+    pub method: Method,
+    /// How far the clouds may be turned. Default [`RotationRange::Any`].
+    pub rotation: RotationRange,
+    /// A first guess, in input coordinates. Default: none, which stands for the identity.
+    pub given: Option<Rigid>,
+    /// The refinement; `None` answers with the coarse pose. Default on.
+    pub refine: Option<RefineConfig>,
+    /// Weights: a file, or the name of a model in the program. Default `srrf-small`.
+    pub weights: Option<String>,
+    /// Device of the network. Default `flex`.
+    pub device: String,
+    /// Seed of the random samples of FPFH with RANSAC; nothing else draws. Default 0.
+    pub seed: u64,
+    /// The verdict is to abstain where the probability is below this. Default 0.5.
+    pub abstain_below: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            method: Method::Auto,
+            rotation: RotationRange::Any,
+            given: None,
+            refine: Some(RefineConfig::default()),
+            weights: None,
+            device: "flex".to_owned(),
+            seed: 0,
+            abstain_below: 0.5,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_come_back() {
+        for method in Method::ALL {
+            assert_eq!(method.name().parse(), Ok(method));
+            assert_eq!(serde_json::to_value(method).unwrap(), method.name());
+        }
+        assert!("magic".parse::<Method>().unwrap_err().to_string().contains("fpfh-ransac"));
+        assert_eq!("180".parse(), Ok(RotationRange::Any));
+        assert!("90".parse::<RotationRange>().is_err());
+    }
+}

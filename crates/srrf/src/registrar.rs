@@ -1,0 +1,300 @@
+//! [`Registrar`]: the way from two clouds to an [`Outcome`], one statement a stage.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+use srrf_baselines::{FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
+use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid};
+use srrf_refine::{RefineError, RefineTarget, Refinement};
+
+use crate::frame::{Centred, from_input, to_input};
+use crate::network::{Network, thinned};
+use crate::options::{Method, Options, RotationRange};
+use crate::outcome::{CoarsePose, Outcome, PointCounts, StageTime};
+use crate::probability::{Features, Logistic};
+use crate::starts::{cube_rotations, turned};
+
+/// With this probability after the first round of starts, no second one is made.
+const SURE: f64 = 0.9;
+
+/// Why clouds could not be registered.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The options, the weights or the device cannot be used.
+    #[error("{0}")]
+    Setup(String),
+    /// The source cannot be used.
+    #[error("source: {0}")]
+    Source(#[source] CloudError),
+    /// The target cannot be used.
+    #[error("target: {0}")]
+    Target(#[source] CloudError),
+    /// No method found a pose.
+    #[error("no pose found: {0}")]
+    NoPose(String),
+    /// The refinement could not run.
+    #[error("refinement: {0}")]
+    Refine(#[source] RefineError),
+}
+
+/// Registers pairs with one set of options; holds the network. Share it between threads.
+#[derive(Debug)]
+pub struct Registrar {
+    options: Options,
+    network: Option<Network>,
+    calibration: Logistic,
+}
+
+/// A target made ready, to register many sources to it.
+#[derive(Debug)]
+pub struct Target {
+    centred: Centred,
+    thin: PointCloud,
+    refine: RefineTarget,
+    points: usize,
+    seconds: f64,
+}
+
+/// A pose between the centred clouds, and the start that it is.
+type Start = (String, Rigid);
+
+/// What a round of starts came to.
+struct Round {
+    pose: Rigid,
+    start: String,
+    refinement: Option<Refinement>,
+    features: Features,
+    probability: f64,
+}
+
+impl Registrar {
+    /// Loads what the options need.
+    ///
+    /// # Errors
+    /// [`Error::Setup`] for unknown weights or devices, and settings that make no sense.
+    pub fn new(options: Options) -> Result<Self, Error> {
+        if let Some(config) = &options.refine {
+            config.validate().map_err(Error::Refine)?;
+        }
+        let network = match options.method {
+            Method::Auto | Method::Srrf => Some(
+                Network::load(options.weights.as_deref(), &options.device).map_err(Error::Setup)?,
+            ),
+            _ => None,
+        };
+        Ok(Self { options, network, calibration: Logistic::embedded().map_err(Error::Setup)? })
+    }
+
+    /// The options.
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
+    /// Makes a target ready for many sources.
+    ///
+    /// # Errors
+    /// [`Error::Target`] for a cloud that determines no rotation.
+    pub fn prepare(&self, target: &PointCloud) -> Result<Target, Error> {
+        let begun = Instant::now();
+        target.check_rotation_observable().map_err(Error::Target)?;
+        let centred = Centred::new(target).map_err(Error::Target)?;
+        let thin = thinned(&centred.cloud);
+        let config = self.options.refine.unwrap_or_default();
+        let refine = RefineTarget::new(&centred.cloud, &config).map_err(Error::Refine)?;
+        Ok(Target { centred, thin, refine, points: target.len(), seconds: begun.elapsed().as_secs_f64() })
+    }
+
+    /// Registers `source` to `target`: `target ~ R source + t`.
+    ///
+    /// # Errors
+    /// [`Error`] for clouds that determine no rotation, and where no pose is found.
+    pub fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Outcome, Error> {
+        source.check_rotation_observable().map_err(Error::Source)?;
+        self.register_to(source, &self.prepare(target)?)
+    }
+
+    /// Registers `source` to a prepared target.
+    ///
+    /// # Errors
+    /// As [`Registrar::register`].
+    pub fn register_to(&self, source: &PointCloud, target: &Target) -> Result<Outcome, Error> {
+        let mut clock = Clock::new();
+        clock.times.push(StageTime { stage: "prepare target", seconds: target.seconds });
+        source.check_rotation_observable().map_err(Error::Source)?;
+        let centred = Centred::new(source).map_err(Error::Source)?;
+        let thin = thinned(&centred.cloud);
+        let given = match &self.options.given {
+            Some(pose) => from_input(pose, &centred, &target.centred),
+            None => from_input(&Rigid::identity(), &centred, &target.centred),
+        };
+        clock.lap("prepare source");
+
+        // The first round: one look of the network, FPFH with RANSAC, the given pose.
+        let mut warnings = Vec::new();
+        let mut network = None;
+        let mut starts: Vec<Start> = Vec::new();
+        if let Some(net) = &self.network {
+            let centre_to_centre = turned(given.rotation);
+            match net.from_start(&thin, &target.thin, &centre_to_centre) {
+                Ok(found) => {
+                    starts.extend(poses_of(&found, "network"));
+                    network = Some(self.coarse(&found, &centred, target));
+                }
+                Err(e) => warnings.push(format!("The network found no pose: {e}.")),
+            }
+            clock.lap("network");
+        }
+        match self.options.method {
+            Method::Auto | Method::FpfhRansac => {
+                match self.global(&centred.cloud, &target.centred.cloud) {
+                    Ok(pose) => starts.push(("fpfh-ransac".to_owned(), pose)),
+                    Err(e) => warnings.push(format!("FPFH with RANSAC found no pose: {e}.")),
+                }
+                clock.lap("fpfh-ransac");
+            }
+            Method::Icp => {
+                let found = icp(&centred.cloud, &target.centred.cloud, &given)
+                    .map_err(|e| Error::NoPose(e.to_string()))?;
+                starts.push(("icp".to_owned(), found));
+                clock.lap("icp");
+            }
+            Method::Srrf | Method::Given => {}
+        }
+        if self.options.method == Method::Given || (self.options.method == Method::Auto) {
+            starts.push(("given".to_owned(), given));
+        }
+        let mut best = self.round(&centred.cloud, target, &starts, &warnings)?;
+        clock.lap("refine");
+
+        // The second round, where the first left doubt: the network from all around.
+        if let Some(net) = &self.network
+            && self.options.rotation == RotationRange::Any
+            && best.probability < SURE
+        {
+            let found: Vec<Start> = cube_rotations()[1..]
+                .par_iter()
+                .enumerate()
+                .filter_map(|(i, rotation)| {
+                    let start = turned(given.rotation * rotation);
+                    let found = net.from_start(&thin, &target.thin, &start).ok()?;
+                    Some((format!("network, orientation {}", i + 1), found.target_from_source))
+                })
+                .collect();
+            clock.lap("network, 23 orientations");
+            starts.extend(found);
+            best = self.round(&centred.cloud, target, &starts, &warnings)?;
+            clock.lap("refine again");
+        }
+
+        let evidence = match &best.refinement {
+            Some(refinement) => refinement.evidence.clone(),
+            None => target.refine.evidence(&centred.cloud, &best.pose).map_err(Error::Refine)?,
+        };
+        let abstain = best.probability < self.options.abstain_below;
+        if abstain {
+            warnings.push(format!(
+                "The pose is right with a probability of {:.0}% only: check it, give a first guess, or crop both \
+                 clouds to what they share.",
+                100.0 * best.probability
+            ));
+        }
+        Ok(Outcome {
+            target_from_source: to_input(&best.pose, &centred, &target.centred),
+            probability: best.probability,
+            abstain,
+            method: self.options.method,
+            start: best.start,
+            network,
+            refinement: best.refinement,
+            evidence,
+            features: best.features,
+            points: PointCounts { source: source.len(), target: target.points },
+            times: clock.times,
+            seed: self.options.seed,
+            weights: self.network.as_ref().map(|n| (n.name.clone(), n.sha256.clone())),
+            warnings,
+        })
+    }
+
+    /// Refines the best supported of `starts`, or takes the first one where refinement is off.
+    fn round(
+        &self,
+        source: &PointCloud,
+        target: &Target,
+        starts: &[Start],
+        warnings: &[String],
+    ) -> Result<Round, Error> {
+        let Some((first_name, first)) = starts.first() else {
+            return Err(Error::NoPose(warnings.join(" ")));
+        };
+        let named: Vec<(&str, Rigid)> = starts.iter().map(|(name, pose)| (name.as_str(), *pose)).collect();
+        if self.options.refine.is_none() {
+            let evidence = target.refine.evidence(source, first).map_err(Error::Refine)?;
+            let features = Features::new(&evidence, None, first, &[]);
+            let probability = self.calibration.probability(&features);
+            return Ok(Round { pose: *first, start: first_name.clone(), refinement: None, features, probability });
+        }
+        let refined = target.refine.refine(source, &named).map_err(Error::Refine)?;
+        let rivals: Vec<(Rigid, f64)> =
+            refined.starts.iter().map(|s| (s.target_from_source, s.support)).collect();
+        let pose = refined.target_from_source;
+        let features = Features::new(&refined.evidence, Some(&refined), &pose, &rivals);
+        let probability = self.calibration.probability(&features);
+        Ok(Round { pose, start: refined.start.clone(), features, probability, refinement: Some(refined) })
+    }
+
+    fn global(&self, source: &PointCloud, target: &PointCloud) -> Result<Rigid, RegisterError> {
+        let config = FpfhRansacConfig { seed: self.options.seed, ..FpfhRansacConfig::default() };
+        Ok(FpfhRansac::new(config).register(source, target)?.target_from_source)
+    }
+
+    fn coarse(&self, found: &Registration, source: &Centred, target: &Target) -> CoarsePose {
+        let input = |pose: &Rigid| to_input(pose, source, &target.centred);
+        let mut branches = found.branches.clone();
+        for branch in &mut branches {
+            branch.target_from_source = input(&branch.target_from_source);
+        }
+        let gamma = |name: &str| branches.iter().find(|b| b.name == name).map_or(0.0, |b| b.inlier_ratio);
+        let (dense, skeleton) = (gamma("dense"), gamma("skeleton"));
+        let lambda = if dense + skeleton > 0.0 { dense / (dense + skeleton) } else { 0.5 };
+        let mut skeletons = found.skeletons.clone();
+        if let Some(skeletons) = &mut skeletons {
+            let shift = |points: &mut Vec<[f64; 3]>, centre: &nalgebra::Vector3<f64>| {
+                points.iter_mut().for_each(|p| (0..3).for_each(|c| p[c] += centre[c]));
+            };
+            shift(&mut skeletons.source, &source.centre);
+            shift(&mut skeletons.target, &target.centred.centre);
+        }
+        CoarsePose { target_from_source: input(&found.target_from_source), branches, lambda, skeletons }
+    }
+}
+
+/// The fused pose of the network and those of its branches.
+fn poses_of(found: &Registration, name: &str) -> Vec<Start> {
+    let mut poses = vec![(format!("{name} fused"), found.target_from_source)];
+    poses.extend(found.branches.iter().map(|b| (format!("{name} {}", b.name), b.target_from_source)));
+    poses
+}
+
+/// ICP, point to point, from a given pose.
+fn icp(source: &PointCloud, target: &PointCloud, given: &Rigid) -> Result<Rigid, RegisterError> {
+    let found = Icp::new(IcpConfig::default()).register(&source.transformed(given), target)?;
+    Ok(found.target_from_source.compose(given))
+}
+
+/// Times of the stages.
+struct Clock {
+    last: Instant,
+    times: Vec<StageTime>,
+}
+
+impl Clock {
+    fn new() -> Self {
+        Self { last: Instant::now(), times: Vec::new() }
+    }
+
+    fn lap(&mut self, stage: &'static str) {
+        self.times.push(StageTime { stage, seconds: self.last.elapsed().as_secs_f64() });
+        self.last = Instant::now();
+    }
+}
