@@ -65,8 +65,8 @@ pub struct RefineConfig {
     /// Clouds with more points than this skip the soft stage. Default 4,096: at that density nearest
     /// neighbours on planes are as exact, and faster.
     pub soft_points: usize,
-    /// Whether to look for deformation, which makes exact alignment worthless, and then to answer
-    /// with point to point from the start. Default true; clouds of more than `coarse_points` are exempt.
+    /// Whether to look for deformation, which makes exact alignment worthless, and then to go only
+    /// halfway ([`crate::Verdict::Deformed`]). Default true; clouds of more than `coarse_points` are exempt.
     pub check_deformation: bool,
 }
 
