@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use srrf_baselines::{Icp, IcpConfig, Identity};
+use srrf_baselines::{Fgr, FpfhRansac, Icp, IcpConfig, IcpPlane, IcpRobust, IcpTrimmed, Identity};
 use srrf_cloud::Register;
 use srrf_model::{SrrfRegister, embedded, weights};
+use srrf_refine::{RefineConfig, Refined};
 
 use crate::EvalError;
 use crate::transforms::Transforms;
@@ -58,20 +59,41 @@ pub const METHODS: &[MethodEntry] = &[
         by_default: false,
         build: |_| Ok(plain(Icp::new(IcpConfig { centred: true, ..IcpConfig::default() }))),
     },
+    optional("icp-plane", &["icp-plane"], |_| Ok(plain(IcpPlane::default()))),
+    optional("icp-trimmed", &["icp-trimmed"], |_| Ok(plain(IcpTrimmed::default()))),
+    optional("icp-robust", &["icp-robust"], |_| Ok(plain(IcpRobust::default()))),
+    optional("fpfh-ransac", &["fpfh-ransac"], |_| Ok(plain(FpfhRansac::default()))),
+    optional("fgr", &["fgr"], |_| Ok(plain(Fgr::default()))),
     MethodEntry {
         name: "srrf",
         rows: &["srrf-dense", "srrf-skeleton", "srrf"],
         by_default: true,
-        build: srrf,
+        build: |context| {
+            let (register, weights) = srrf(context)?;
+            Ok(Method { weights: Some(weights), ..plain(register) })
+        },
     },
+    optional("srrf+refine", &["srrf+refine"], |context| {
+        let (register, weights) = srrf(context)?;
+        Ok(Method { weights: Some(weights), ..plain(Refined::new(register, RefineConfig::default())) })
+    }),
 ];
+
+/// An entry that runs only where `--methods` names it.
+const fn optional(
+    name: &'static str,
+    rows: &'static [&'static str],
+    build: fn(&MethodContext) -> Result<Method, String>,
+) -> MethodEntry {
+    MethodEntry { name, rows, by_default: false, build }
+}
 
 fn plain(register: impl Register + 'static) -> Method {
     Method { register: Box::new(register), weights: None, parallel_inside: false }
 }
 
 /// The network, with the weights of `--weights` or those in the program.
-fn srrf(context: &MethodContext) -> Result<Method, String> {
+fn srrf(context: &MethodContext) -> Result<(SrrfRegister, String), String> {
     let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
     let (loaded, origin) = match &context.weights {
         Some(path) => match path.to_str().and_then(|name| embedded::load(name, &device)) {
@@ -83,7 +105,7 @@ fn srrf(context: &MethodContext) -> Result<Method, String> {
     let loaded = loaded.map_err(|e| e.to_string())?;
     let data = loaded.metadata.get("data").map_or("unknown data", String::as_str);
     let weights = format!("{} ({origin}, sha256 {}), trained on {data}", loaded.name, &loaded.sha256[..16]);
-    Ok(Method { weights: Some(weights), ..plain(SrrfRegister::new(loaded, device)) })
+    Ok((SrrfRegister::new(loaded, device), weights))
 }
 
 /// The rows of a run and the methods that fill them.
