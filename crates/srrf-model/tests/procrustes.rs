@@ -7,7 +7,8 @@ mod common;
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use common::{Numbers, difference, row_major, tensor64, values};
 use nalgebra::{Matrix3, Vector3};
-use srrf_model::{nearest_rotation, procrustes};
+use srrf_cloud::Rigid;
+use srrf_model::{nearest_rotation, procrustes, weighted_procrustes};
 
 /// The share of the largest singular value below which the head keeps no gap.
 const MIN_GAP: f64 = 1e-3;
@@ -261,5 +262,49 @@ fn known_poses_are_recovered() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn weighted_fit_is_that_of_the_host_and_differentiable_in_the_weights() {
+    const N: usize = 17;
+    let mut numbers = Numbers(31);
+    let (x, y) = (numbers.many(N * 3), numbers.many(N * 3));
+    let raw: Vec<f64> = numbers.many(N).iter().map(|v| v * v + 0.01).collect();
+    let total: f64 = raw.iter().sum();
+    let weights: Vec<f64> = raw.iter().map(|v| v / total).collect();
+    let fit = |weights: &[f64], device: &Device| {
+        let points = |v: &[f64]| tensor64::<3>(v, [1, N, 3], device);
+        let mut w = tensor64::<3>(weights, [1, N, 1], device);
+        if *device != Device::flex() {
+            w = w.require_grad();
+        }
+        let (rotation, translation) = weighted_procrustes(points(&x), points(&y), w.clone());
+        (w, rotation, translation)
+    };
+    let (_, rotation, translation) = fit(&weights, &Device::flex());
+    let rows = |v: &[f64]| -> Vec<[f64; 3]> { v.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect() };
+    let wanted = Rigid::fit(&rows(&x), &rows(&y), Some(&weights)).expect("a pose");
+    assert!(difference(&values(&rotation), &row_major(&wanted.rotation)) < 1e-9);
+    assert!(difference(&values(&translation), wanted.translation.as_slice()) < 1e-9);
+
+    let c = numbers.many(9);
+    let sum = |weights: &[f64]| -> f64 {
+        let (_, rotation, translation) = fit(weights, &Device::flex());
+        let turned: f64 = values(&rotation).iter().zip(&c).map(|(r, c)| r * c).sum();
+        turned + values(&translation).iter().sum::<f64>()
+    };
+    let device = Device::flex().autodiff();
+    let (w, rotation, translation) = fit(&weights, &device);
+    let loss = (rotation * tensor64::<3>(&c, [1, 3, 3], &device)).sum() + translation.sum();
+    let gradient = values(&w.grad(&loss.backward()).expect("a gradient"));
+    for i in (0..N).step_by(4) {
+        let moved = |step: f64| {
+            let mut weights = weights.clone();
+            weights[i] += step;
+            sum(&weights)
+        };
+        let slope = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+        assert!((gradient[i] - slope).abs() < 1e-5 * (1.0 + slope.abs()), "{i}: {} {slope}", gradient[i]);
     }
 }
