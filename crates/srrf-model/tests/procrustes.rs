@@ -276,7 +276,7 @@ fn weighted_fit_is_that_of_the_host_and_differentiable_in_the_weights() {
     let fit = |weights: &[f64], device: &Device| {
         let points = |v: &[f64]| tensor64::<3>(v, [1, N, 3], device);
         let mut w = tensor64::<3>(weights, [1, N, 1], device);
-        if *device != Device::flex() {
+        if device.is_autodiff() {
             w = w.require_grad();
         }
         let (rotation, translation) = weighted_procrustes(points(&x), points(&y), w.clone());
