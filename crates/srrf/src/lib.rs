@@ -27,12 +27,14 @@ mod options;
 mod outcome;
 mod probability;
 mod registrar;
+mod skeleton;
 mod starts;
 
 pub use options::{Method, Options, OptionsError, RotationRange};
 pub use outcome::{CoarsePose, Outcome, PointCounts, StageTime};
 pub use probability::{FEATURES, Features, Logistic};
 pub use registrar::{Error, Registrar, Target};
+pub use skeleton::{Skeleton, skeleton};
 
 use srrf_cloud::PointCloud;
 

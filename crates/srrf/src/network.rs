@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid, voxel_downsample};
-use srrf_model::{SrrfRegister, embedded, weights};
+use srrf_model::weights::{self, LoadedModel};
+use srrf_model::{SrrfRegister, embedded};
 
 /// Points of the cloud that the network chooses its 1,024 from: enough to look evenly over a scan.
 const THINNED: usize = 8192;
@@ -24,22 +25,8 @@ impl Network {
     /// # Errors
     /// In words, with the file and the way out.
     pub fn load(from: Option<&str>, device: &str) -> Result<Self, String> {
+        let loaded = open(from, device)?;
         let device = srrf_model::device(device).map_err(|e| e.to_string())?;
-        let loaded = match from {
-            None => embedded::load_default(&device),
-            Some(name) => match embedded::load(name, &device) {
-                Some(loaded) => loaded,
-                None if Path::new(name).exists() => weights::load(Path::new(name), &device),
-                None => {
-                    let known: Vec<&str> = embedded::names().collect();
-                    return Err(format!(
-                        "--weights {name}: no such file, and no model of that name in the program (it has {})",
-                        known.join(", ")
-                    ));
-                }
-            },
-        };
-        let loaded = loaded.map_err(|e| e.to_string())?;
         let (name, sha256) = (loaded.name.clone(), loaded.sha256.clone());
         Ok(Self { register: SrrfRegister::new(loaded, device), name, sha256 })
     }
@@ -65,6 +52,30 @@ impl Network {
         }
         Ok(found)
     }
+}
+
+/// Loads weights, a file or the name of a model in the program (`None`: the default), to the device of
+/// a name.
+///
+/// # Errors
+/// In words, with the file and the way out.
+pub fn open(from: Option<&str>, device: &str) -> Result<LoadedModel, String> {
+    let device = srrf_model::device(device).map_err(|e| e.to_string())?;
+    let loaded = match from {
+        None => embedded::load_default(&device),
+        Some(name) => match embedded::load(name, &device) {
+            Some(loaded) => loaded,
+            None if Path::new(name).exists() => weights::load(Path::new(name), &device),
+            None => {
+                let known: Vec<&str> = embedded::names().collect();
+                return Err(format!(
+                    "--weights {name}: no such file, and no model of that name in the program (it has {})",
+                    known.join(", ")
+                ));
+            }
+        },
+    };
+    loaded.map_err(|e| e.to_string())
 }
 
 /// An even part of a large cloud: voxel centroids, [`THINNED`] or fewer. A cloud that is small already

@@ -1,0 +1,202 @@
+//! `srrf batch`: many pairs, in parallel.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::ThreadPoolBuilder;
+use serde_json::{Value, json};
+use srrf::{Options, Registrar};
+
+use super::batch_output::Results;
+use super::batch_pairs::{PairRow, Pairs};
+use super::failure::Failure;
+use super::method::MethodArgs;
+use super::register::{failed, to_json, warning};
+use super::say::{Voice, count};
+use super::{Common, files, interrupt, transform};
+
+const HELP: &str = "Exit codes:
+  0    every pair has a pose (see `abstain` in its line)
+  1    some pairs have none (see `error` in their lines), or the results could not be written
+  2    bad usage, list or results file
+  130  interrupted; the same command goes on where it stopped";
+
+/// Register the pairs of a CSV list, in parallel: one JSON line a pair, in the order of the list.
+///
+/// The list has the columns `source`, `target` and, if wanted, `initial` (a file with a first guess); files are
+/// relative to it. Pairs that are in the results already are skipped, so that the same command goes on after an
+/// interruption; delete a line to have its pair done again.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct BatchArgs {
+    /// The list
+    pairs: PathBuf,
+
+    /// The results, one JSON object a line; or `-`
+    #[arg(short, long, value_name = "FILE")]
+    out: PathBuf,
+
+    #[command(flatten)]
+    method: MethodArgs,
+
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Registers all pairs.
+///
+/// # Errors
+/// [`Failure`], with its exit code.
+pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
+    files::check_output(&args.out)?;
+    let threads = args.common.start_threads()?;
+    let pairs = Pairs::read(&args.pairs)?;
+    let options = args.method.options();
+    let registrar = Registrar::new(options.clone()).map_err(|e| Failure::Usage(e.to_string()))?;
+    let described = args.describe();
+    let (results, done) = Results::open(&args.out, &pairs.rows, &described)?;
+    let todo: Vec<&PairRow> = pairs.rows.iter().filter(|row| !done.contains(&row.number)).collect();
+    let voice = Voice::new(args.common.quiet, files::is_stream(&args.out));
+    if !done.is_empty() {
+        voice.say(&format!("{} of {} pairs are done already", count(done.len()), count(pairs.rows.len())));
+    }
+    interrupt::advise("; the same command goes on where this one stopped");
+
+    let bar = progress(todo.len(), args.common.quiet);
+    let batch = Batch { pairs: &pairs, registrar: &registrar, options: &options, described: &described };
+    let tally = batch.run(&todo, threads, results, &bar)?;
+    bar.finish_and_clear();
+    voice.say(&format!(
+        "{} pairs: {} probably right, {} abstained, {} without a pose",
+        count(todo.len()),
+        count(todo.len() - tally.abstained - tally.failed),
+        count(tally.abstained),
+        count(tally.failed)
+    ));
+    Ok(if tally.failed > 0 { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+impl BatchArgs {
+    /// What the answers depend on besides the clouds.
+    fn describe(&self) -> Value {
+        let m = &self.method;
+        json!({
+            "method": m.method,
+            "rotation": m.rotation,
+            "refine": !m.no_refine,
+            "weights": m.weights,
+            "seed": m.seed,
+        })
+    }
+}
+
+/// How many pairs went otherwise than hoped.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tally {
+    abstained: usize,
+    failed: usize,
+}
+
+struct Batch<'a> {
+    pairs: &'a Pairs,
+    registrar: &'a Registrar,
+    options: &'a Options,
+    described: &'a Value,
+}
+
+impl Batch<'_> {
+    /// Each worker takes the next pair, on threads of its own: as long as there are more pairs than threads,
+    /// none waits for another.
+    fn run(
+        &self,
+        todo: &[&PairRow],
+        threads: usize,
+        results: Results,
+        bar: &ProgressBar,
+    ) -> Result<Tally, Failure> {
+        let workers = threads.min(todo.len()).max(1);
+        let next = AtomicUsize::new(0);
+        let state = Mutex::new((results, Tally::default(), Ok(())));
+        let work = || {
+            let pool = ThreadPoolBuilder::new().num_threads((threads / workers).max(1)).build();
+            let pool = match pool {
+                Ok(pool) => pool,
+                Err(e) => {
+                    let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+                    state.2 =
+                        Err(Failure::Other(format!("cannot start worker threads: {e}; try --threads 1")));
+                    return;
+                }
+            };
+            loop {
+                let place = next.fetch_add(1, Ordering::Relaxed);
+                let Some(row) = todo.get(place) else { return };
+                let (value, abstain) = pool.install(|| self.line(row));
+                let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+                state.1.abstained += usize::from(abstain == Some(true));
+                state.1.failed += usize::from(abstain.is_none());
+                if state.2.is_ok() {
+                    state.2 = state.0.put(place, &value);
+                }
+                if state.2.is_err() {
+                    return;
+                }
+                bar.inc(1);
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..workers {
+                scope.spawn(work);
+            }
+        });
+        let (_, tally, outcome) = state.into_inner().unwrap_or_else(PoisonError::into_inner);
+        outcome.map(|()| tally)
+    }
+
+    /// The line of a pair, and whether its pose is doubtful; `None` without a pose.
+    fn line(&self, row: &PairRow) -> (Value, Option<bool>) {
+        let (mut value, abstain) = match self.register(row) {
+            Ok((value, abstain)) => (value, Some(abstain)),
+            Err(failure) => {
+                (json!({ "source": row.source, "target": row.target, "error": failure.to_string() }), None)
+            }
+        };
+        if let Value::Object(map) = &mut value {
+            map.insert("pair".into(), json!(row.number));
+            map.insert("initial".into(), json!(row.initial));
+            map.insert("options".into(), self.described.clone());
+        }
+        (value, abstain)
+    }
+
+    fn register(&self, row: &PairRow) -> Result<(Value, bool), Failure> {
+        let source = files::read_solid(&self.pairs.path(&row.source), None)?;
+        let target = files::read_solid(&self.pairs.path(&row.target), None)?;
+        let fail = |e: srrf::Error| failed(&e, &source.name, &target.name);
+        let mut outcome = match &row.initial {
+            None => self.registrar.register(&source.cloud, &target.cloud).map_err(fail)?,
+            Some(initial) => {
+                let given = Some(transform::read(&self.pairs.path(initial))?);
+                let registrar = Registrar::new(Options { given, ..self.options.clone() }).map_err(fail)?;
+                registrar.register(&source.cloud, &target.cloud).map_err(fail)?
+            }
+        };
+        let dropped = [source.dropped, target.dropped];
+        outcome.warnings.extend([&source, &target].into_iter().filter_map(|i| warning(&i.name, i.dropped)));
+        Ok((to_json(&outcome, &row.source, &row.target, dropped), outcome.abstain))
+    }
+}
+
+/// A bar on the terminal, if there is one.
+fn progress(total: usize, quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    let template = "{wide_bar} {pos}/{len} pairs, {eta} left";
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(total as u64).with_style(style)
+}

@@ -1,0 +1,185 @@
+//! Clouds and results in files and streams; `-` is standard input or output.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
+
+use srrf_cloud::io::{
+    CloudFile, IoError, Kept, is_cloud_file, write_atomically, write_cloud, write_cloud_to,
+};
+use srrf_cloud::{PointCloud, Rigid};
+
+use super::failure::Failure;
+use super::interrupt;
+
+/// A cloud with the file that it came from.
+#[derive(Debug)]
+pub struct Input {
+    /// The path, or `-`.
+    pub name: String,
+    /// The file.
+    pub file: CloudFile,
+    /// Its points that are finite.
+    pub cloud: PointCloud,
+    /// Points left out because a coordinate is NaN or infinite.
+    pub dropped: usize,
+}
+
+/// Whether a path stands for standard input or output.
+pub fn is_stream(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Reads a cloud. `format` is for streams.
+///
+/// # Errors
+/// [`Failure::Usage`], which names the file.
+pub fn read(path: &Path, format: Option<&str>) -> Result<Input, Failure> {
+    let file = match (is_stream(path), format) {
+        (true, format) => CloudFile::from_reader(&mut io::stdin().lock(), format)?,
+        (false, None) => CloudFile::open(path)?,
+        (false, Some(format)) => {
+            return Err(Failure::Usage(format!(
+                "{path:?} is a file, whose name or content says its format; `{format}` can be asked for streams only"
+            )));
+        }
+    };
+    let (cloud, dropped) = file.cloud_dropping_nan()?;
+    Ok(Input { name: path.display().to_string(), file, cloud, dropped })
+}
+
+/// As [`read`], of a cloud that determines a rotation.
+///
+/// # Errors
+/// As [`read`]; also for fewer than three points and for points on one line.
+pub fn read_solid(path: &Path, format: Option<&str>) -> Result<Input, Failure> {
+    let input = read(path, format)?;
+    input.cloud.check_rotation_observable().map_err(|e| Failure::cloud(&input.name, &e))?;
+    Ok(input)
+}
+
+/// Checks, before any work is done, that there is a place for `path`.
+///
+/// # Errors
+/// [`Failure::Usage`] for a folder, or a file in a folder that does not exist.
+pub fn check_output(path: &Path) -> Result<(), Failure> {
+    if is_stream(path) {
+        return Ok(());
+    }
+    if path.is_dir() {
+        return Err(Failure::Usage(format!("cannot write {path:?}: it is a folder; name a file in it")));
+    }
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => Err(Failure::Usage(format!(
+            "cannot write {path:?}: the folder {folder:?} does not exist; create it first"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// As [`check_output`], for a cloud, whose extension says the format.
+///
+/// # Errors
+/// As [`check_output`]; [`Failure::Usage`] for an extension of no known format.
+pub fn check_cloud_output(path: &Path) -> Result<(), Failure> {
+    check_output(path)?;
+    if is_stream(path) || is_special(path) || is_cloud_file(path) {
+        return Ok(());
+    }
+    Err(Failure::Usage(format!(
+        "cannot write {path:?}: its extension names no format of clouds that this build has; use one of {}",
+        srrf_cloud::io::format_names().join(", ")
+    )))
+}
+
+/// Whether there is something at `path` that must not be replaced by a file, such as `/dev/null`.
+fn is_special(path: &Path) -> bool {
+    path.metadata().is_ok_and(|m| !m.is_file())
+}
+
+/// Writes a result, whole or not at all.
+///
+/// # Errors
+/// [`Failure::Other`], which names the file.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let _guard = interrupt::hold();
+    let written = if is_stream(path) {
+        let mut out = io::stdout().lock();
+        gone_is_fine(out.write_all(bytes).and_then(|()| out.flush()))
+    } else if is_special(path) {
+        File::create(path).and_then(|mut file| file.write_all(bytes))
+    } else {
+        write_atomically(path, |out| out.write_all(bytes))
+    };
+    written.map_err(|e| {
+        Failure::Other(format!("cannot write {path:?}: {e}; choose another place for the output"))
+    })
+}
+
+/// Writes a cloud; to a stream as PLY.
+///
+/// # Errors
+/// [`Failure`], which names the file.
+pub fn write_points(path: &Path, cloud: &PointCloud) -> Result<(), Failure> {
+    let _guard = interrupt::hold();
+    Ok(match () {
+        () if is_stream(path) => write_cloud_to(&mut io::stdout().lock(), "ply", cloud),
+        () if is_special(path) => write_cloud_to(&mut open(path)?, "ply", cloud),
+        () => write_cloud(path, cloud),
+    }?)
+}
+
+/// Writes a moved copy of a file; to a stream in its own format.
+///
+/// # Errors
+/// [`Failure`], which names the file.
+pub fn write_moved(path: &Path, file: &CloudFile, pose: &Rigid) -> Result<Kept, Failure> {
+    let _guard = interrupt::hold();
+    Ok(match () {
+        () if is_stream(path) => file.write_transformed_to(&mut io::stdout().lock(), None, pose),
+        () if is_special(path) => file.write_transformed_to(&mut open(path)?, None, pose),
+        () => file.write_transformed(path, pose),
+    }?)
+}
+
+fn open(path: &Path) -> Result<File, IoError> {
+    File::create(path).map_err(|source| IoError::Write { path: path.to_owned(), source })
+}
+
+/// A reader that has gone away, as `head` does, is no failure.
+fn gone_is_fine(written: io::Result<()>) -> io::Result<()> {
+    match written {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_checked_before_the_work() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(check_output(&folder.path().join("a.txt")).is_ok());
+        assert!(check_output(Path::new("-")).is_ok());
+        let error = check_output(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("it is a folder"), "{error}");
+        let error = check_output(&folder.path().join("none/a.txt")).unwrap_err().to_string();
+        assert!(error.contains("does not exist; create it first"), "{error}");
+        let error = check_cloud_output(&folder.path().join("a.doc")).unwrap_err().to_string();
+        assert!(error.contains("ply") && error.contains("a.doc"), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_are_written_to_and_not_replaced() {
+        let null = Path::new("/dev/null");
+        write(null, b"x").unwrap();
+        assert!(is_special(null));
+        let cloud = PointCloud::new(vec![[1.0; 3]]).unwrap();
+        check_cloud_output(null).unwrap();
+        write_points(null, &cloud).unwrap();
+        assert!(is_special(null));
+    }
+}

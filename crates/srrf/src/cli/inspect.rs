@@ -1,0 +1,128 @@
+//! `srrf inspect`: what is in a file.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::Common;
+use super::failure::Failure;
+use super::files::{self, Input};
+use super::say::{Voice, count, length, points, vector};
+use super::statistics::Statistics;
+
+/// Say what is in clouds: sizes, bounds, spacing, points with NaN, and what looks corrupted.
+#[derive(Debug, Args)]
+pub struct InspectArgs {
+    /// The clouds; `-` reads one from standard input
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+
+    /// Print JSON: a list with an object for each file
+    #[arg(long)]
+    json: bool,
+
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Inspects all files; those that cannot be read are named, and the others inspected all the same.
+///
+/// # Errors
+/// [`Failure`], with its exit code.
+pub fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
+    args.common.start_threads()?;
+    let mut values = Vec::new();
+    let mut failures = Vec::new();
+    for path in &args.files {
+        match inspect(path) {
+            Ok((input, statistics)) if args.json => values.push(to_json(&input, &statistics)),
+            Ok((input, statistics)) => {
+                let out = Voice::new(args.common.quiet, false);
+                out.say(to_text(&input, &statistics).trim_end());
+            }
+            Err(failure) => {
+                if args.json {
+                    values.push(json!({ "file": path.display().to_string(), "error": failure.to_string() }));
+                }
+                failures.push(failure.to_string());
+            }
+        }
+    }
+    if args.json {
+        files::write(Path::new("-"), format!("{:#}\n", Value::Array(values)).as_bytes())?;
+    }
+    if failures.is_empty() { Ok(ExitCode::SUCCESS) } else { Err(Failure::Usage(failures.join("\nerror: "))) }
+}
+
+fn inspect(path: &Path) -> Result<(Input, Statistics), Failure> {
+    let input = files::read(path, None)?;
+    let statistics = Statistics::new(&input.cloud).map_err(|e| Failure::cloud(&input.name, &e))?;
+    Ok((input, statistics))
+}
+
+fn to_json(input: &Input, statistics: &Statistics) -> Value {
+    let mut value = json!(statistics);
+    if let Value::Object(map) = &mut value {
+        map.insert("file".into(), json!(input.name));
+        map.insert("format".into(), json!(input.file.format()));
+        map.insert("dropped_points".into(), json!(input.dropped));
+        map.insert("suggestions".into(), json!(statistics.suggestions()));
+        map.insert("determines_rotation".into(), json!(input.cloud.check_rotation_observable().is_ok()));
+    }
+    value
+}
+
+fn to_text(input: &Input, s: &Statistics) -> String {
+    let mut out = String::new();
+    let mut line = |label: &str, value: String| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(out, "  {label:10} {value}");
+    };
+    let dropped = match input.dropped {
+        0 => String::new(),
+        n => format!(", and {} with NaN or infinity", count(n)),
+    };
+    line("points", format!("{}{dropped}", count(s.points)));
+    let sides: [f64; 3] = std::array::from_fn(|c| s.high[c] - s.low[c]);
+    let scale = if s.spacing > 0.0 { s.spacing } else { s.radius };
+    line("box", format!("{} to {}", vector(s.low, scale, 3), vector(s.high, scale, 3)));
+    line("", format!("sides {}", vector(sides, scale, 3)));
+    line("centroid", vector(s.centroid, scale, 3));
+    line(
+        "radius",
+        format!("{} (farthest point), {} (root mean square)", length(s.radius, 4), length(s.radius_rms, 4)),
+    );
+    line(
+        "spacing",
+        format!(
+            "{} (median to the nearest other point); density {} points a square unit",
+            length(s.spacing, 4),
+            length(s.density, 3)
+        ),
+    );
+    line(
+        "figures",
+        format!(
+            "outliers {:.2} % of {} asked, repeated {:.2} %, clustering {:.2}, off local planes {:.2} spacings",
+            100.0 * s.outliers,
+            count(s.asked),
+            100.0 * s.duplicates,
+            s.clustering,
+            s.roughness
+        ),
+    );
+    if let Err(e) = input.cloud.check_rotation_observable() {
+        line("warning", format!("it cannot be registered: {e}"));
+    }
+    let suggestions = s.suggestions();
+    for suggestion in &suggestions {
+        line("maybe", suggestion.clone());
+    }
+    if suggestions.is_empty() {
+        line("maybe", "nothing; holes, shear and bending cannot be seen in one cloud alone".into());
+    }
+    format!("{}: {}, {}\n{out}", input.name, input.file.format(), points(s.points + input.dropped))
+}

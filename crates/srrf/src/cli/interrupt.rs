@@ -1,0 +1,35 @@
+//! Ctrl-C: the program ends at once with exit code 130, but not in the middle of a write.
+
+use std::io::Write;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::failure::Failure;
+
+/// Held while a file is written.
+static WRITING: Mutex<()> = Mutex::new(());
+/// What to say when interrupted.
+static ADVICE: Mutex<&str> = Mutex::new("");
+
+/// While the guard lives, an interruption waits.
+pub fn hold() -> MutexGuard<'static, ()> {
+    WRITING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What the user is told on an interruption, after "interrupted".
+pub fn advise(advice: &'static str) {
+    *ADVICE.lock().unwrap_or_else(PoisonError::into_inner) = advice;
+}
+
+/// Listens for Ctrl-C and for termination.
+///
+/// # Errors
+/// [`Failure::Other`] where the system refuses.
+pub fn install() -> Result<(), Failure> {
+    ctrlc::set_handler(|| {
+        let _guard = hold();
+        let advice = *ADVICE.lock().unwrap_or_else(PoisonError::into_inner);
+        let _ = writeln!(std::io::stderr(), "\ninterrupted{advice}");
+        std::process::exit(130);
+    })
+    .map_err(|e| Failure::Other(format!("cannot listen for Ctrl-C: {e}")))
+}

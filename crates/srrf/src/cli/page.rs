@@ -1,0 +1,115 @@
+//! Pages that show an answer.
+
+use std::path::Path;
+
+use clap::{Args, ValueEnum};
+use srrf::Outcome;
+use srrf_cloud::Rigid;
+use srrf_view::{Number, Page, Pair, Pose, Skeleton, Up};
+
+use super::files::Input;
+use super::say::count;
+
+/// How to draw.
+#[derive(Debug, Clone, Args)]
+pub struct PageArgs {
+    /// Unit of the coordinates on the page, such as `m`
+    #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
+    unit: String,
+
+    /// The axis that points up on the page at first
+    #[arg(long, value_enum, default_value_t = Axis::Z)]
+    up: Axis,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Axis {
+    Z,
+    Y,
+}
+
+impl PageArgs {
+    /// A pair without poses.
+    pub fn pair<'a>(&self, source: &'a Input, target: &'a Input) -> Pair<'a> {
+        let up = match self.up {
+            Axis::Z => Up::Z,
+            Axis::Y => Up::Y,
+        };
+        let mut pair =
+            Pair::new(title(source, target), &source.cloud, &target.cloud).unit(&*self.unit).up(up);
+        for input in [source, target] {
+            if let Some(warning) = super::register::warning(&input.name, input.dropped) {
+                pair = pair.warning(warning);
+            }
+        }
+        pair
+    }
+}
+
+/// `source to target`, by the names of the files.
+pub fn title(source: &Input, target: &Input) -> String {
+    let short = |input: &Input| {
+        let name = Path::new(&input.name).file_name().map(|n| n.to_string_lossy().into_owned());
+        name.unwrap_or_else(|| input.name.clone())
+    };
+    format!("{} to {}", short(source), short(target))
+}
+
+/// The page of an answer.
+pub fn of_outcome(
+    outcome: &Outcome,
+    source: &Input,
+    target: &Input,
+    given: Option<&Rigid>,
+    args: &PageArgs,
+) -> String {
+    let e = &outcome.evidence;
+    let verdict = if outcome.abstain { "abstain" } else { "probably right" };
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let (angle, _) = super::summary::angle_axis(outcome);
+    let mut pair = args
+        .pair(source, target)
+        .pose(Pose::new("result", outcome.target_from_source))
+        .number(Number::text("Verdict", format!("{verdict} ({})", percent(outcome.probability))).help(
+            "probability that the pose is within 5° and a tenth of the target's radius of the true one",
+        ))
+        .number(Number::new("Rotation", angle).unit("°"))
+        .number(Number::text("Source points near the target", percent(e.fitness)).help(format!(
+            "{} of {} asked, within {:.4}",
+            count(e.inliers),
+            count(e.source_points),
+            e.inlier_threshold
+        )))
+        .number(
+            Number::text("Target points near the source", percent(e.overlap_target))
+                .help(format!("of {} asked", count(e.target_points))),
+        )
+        .number(Number::new("RMSE of the inliers", e.inlier_rmse))
+        .number(Number::text("Start", &*outcome.start));
+    if let Some(given) = given {
+        pair = pair.before(Pose::new("first guess", *given));
+    }
+    if let Some(r) = &outcome.refinement {
+        pair = pair.number(Number::text("Refinement", r.verdict.to_string()));
+    }
+    if let Some(network) = &outcome.network {
+        let inliers = |ratio| {
+            Number::new("Inlier ratio", ratio)
+                .help("share of the branch's correspondences that agree with its pose")
+        };
+        pair = pair.pose(Pose::new("network, fused", network.target_from_source));
+        for branch in &network.branches {
+            let name = format!("network, {}", branch.name);
+            pair = pair.pose(Pose::new(name, branch.target_from_source).number(inliers(branch.inlier_ratio)));
+        }
+        if let Some(skeletons) = &network.skeletons {
+            let skeleton = |points: &[[f64; 3]]| Skeleton { points: points.to_vec(), radii: Vec::new() };
+            pair = pair.skeletons(skeleton(&skeletons.source), skeleton(&skeletons.target));
+        }
+    }
+    // Those about points left out are there already.
+    for warning in outcome.warnings.iter().filter(|w| !w.ends_with("left out.")) {
+        pair = pair.warning(warning);
+    }
+    Page::new(title(source, target)).pair(pair).to_html()
+}

@@ -1,0 +1,207 @@
+//! `srrf register`: two clouds in, the pose out.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Args;
+use serde_json::{Value, json};
+use srrf::{Outcome, Registrar, StageTime};
+use srrf_cloud::Rigid;
+use srrf_cloud::io::Kept;
+
+use super::failure::Failure;
+use super::files::{self, Input};
+use super::method::MethodArgs;
+use super::page::{self, PageArgs};
+use super::say::Voice;
+use super::{Common, EXIT_CODES, summary, transform};
+
+/// The exit code of an answer that is probably wrong.
+const ABSTAINED: u8 = 3;
+
+/// Find the pose that lays one cloud on another: target ~ R source + t.
+///
+/// Any sizes, any unit, any place; points with NaN are left out. `-` reads a cloud from standard input,
+/// and writes a result to standard output.
+#[derive(Debug, Args)]
+#[command(after_help = EXIT_CODES)]
+pub struct RegisterArgs {
+    /// The cloud to move, or `-`
+    source: PathBuf,
+
+    /// The cloud to lay it on, or `-`
+    target: PathBuf,
+
+    /// Write the pose: 4 rows of 4, which `numpy.loadtxt` reads
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+
+    /// Write the source, moved; in its own format colours, faces and all else are kept
+    #[arg(long, value_name = "FILE")]
+    save: Option<PathBuf>,
+
+    /// Write everything that is known of the answer
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+
+    /// Write a page that shows the answer, for any browser
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+
+    /// A first guess: a file of the same kind as `--output` writes
+    #[arg(long, value_name = "FILE")]
+    initial: Option<PathBuf>,
+
+    #[command(flatten)]
+    method: MethodArgs,
+
+    /// Format of the source where it is a stream [default: by its content]
+    #[arg(long, value_name = "NAME")]
+    format_source: Option<String>,
+
+    /// Format of the target where it is a stream [default: by its content]
+    #[arg(long, value_name = "NAME")]
+    format_target: Option<String>,
+
+    #[command(flatten)]
+    page: PageArgs,
+
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Registers.
+///
+/// # Errors
+/// [`Failure`], with its exit code.
+pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
+    let begun = Instant::now();
+    let voice = args.check()?;
+    args.common.start_threads()?;
+    let mut options = args.method.options();
+    options.given = args.initial.as_deref().map(transform::read).transpose()?;
+    let given = options.given;
+    // The network loads while the files are read.
+    let (inputs, registrar) = rayon::join(|| args.read(), || Registrar::new(options));
+    let (source, target) = inputs?;
+    let registrar = registrar.map_err(|e| Failure::Usage(e.to_string()))?;
+    let opened = begun.elapsed().as_secs_f64();
+
+    let mut outcome = registrar
+        .register(&source.cloud, &target.cloud)
+        .map_err(|e| failed(&e, &source.name, &target.name))?;
+    outcome.times.insert(0, StageTime { stage: "read files, load network", seconds: opened });
+    outcome
+        .warnings
+        .extend([&source, &target].into_iter().filter_map(|input| warning(&input.name, input.dropped)));
+
+    let written = args.write(&outcome, &source, &target, given.as_ref())?;
+    if voice != Voice::Quiet {
+        voice.say(&summary::text(&outcome, &source, &target, begun.elapsed().as_secs_f64()));
+        written.iter().for_each(|line| voice.say(line));
+    }
+    Ok(if outcome.abstain { ExitCode::from(ABSTAINED) } else { ExitCode::SUCCESS })
+}
+
+impl RegisterArgs {
+    /// Checks what can be checked before any work, and finds where to speak.
+    fn check(&self) -> Result<Voice, Failure> {
+        if files::is_stream(&self.source) && files::is_stream(&self.target) {
+            return Err(Failure::Usage(
+                "both clouds are `-`: standard input holds one; name a file for the other".into(),
+            ));
+        }
+        let outputs = [&self.output, &self.save, &self.json, &self.html];
+        outputs.into_iter().flatten().try_for_each(|path| files::check_output(path))?;
+        if let Some(path) = &self.save {
+            files::check_cloud_output(path)?;
+        }
+        let streams = outputs.into_iter().flatten().filter(|path| files::is_stream(path)).count();
+        if streams > 1 {
+            return Err(Failure::Usage(format!(
+                "{streams} results are to go to `-`: standard output takes one; name files for the others"
+            )));
+        }
+        Ok(Voice::new(self.common.quiet, streams > 0))
+    }
+
+    fn read(&self) -> Result<(Input, Input), Failure> {
+        Ok((
+            files::read_solid(&self.source, self.format_source.as_deref())?,
+            files::read_solid(&self.target, self.format_target.as_deref())?,
+        ))
+    }
+
+    /// Writes what was asked for; says what was written.
+    fn write(
+        &self,
+        outcome: &Outcome,
+        source: &Input,
+        target: &Input,
+        given: Option<&Rigid>,
+    ) -> Result<Vec<String>, Failure> {
+        let pose = &outcome.target_from_source;
+        let mut lines = Vec::new();
+        if let Some(path) = &self.output {
+            files::write(path, transform::to_text(pose).as_bytes())?;
+            lines.push(wrote(path, "the pose"));
+        }
+        if let Some(path) = &self.save {
+            let what = match files::write_moved(path, &source.file, pose)? {
+                Kept::Everything => "the moved source with all else that its file holds",
+                Kept::Points => {
+                    "the moved points of the source; another format than the source's keeps nothing else"
+                }
+            };
+            lines.push(wrote(path, what));
+        }
+        if let Some(path) = &self.json {
+            let value = to_json(outcome, &source.name, &target.name, [source.dropped, target.dropped]);
+            files::write(path, format!("{value:#}\n").as_bytes())?;
+            lines.push(wrote(path, "all figures"));
+        }
+        if let Some(path) = &self.html {
+            let html = page::of_outcome(outcome, source, target, given, &self.page);
+            files::write(path, html.as_bytes())?;
+            lines.push(wrote(path, "open it in a browser"));
+        }
+        Ok(lines)
+    }
+}
+
+/// The figures of an answer, and of what it was made from.
+pub fn to_json(outcome: &Outcome, source: &str, target: &str, dropped: [usize; 2]) -> Value {
+    let mut value = outcome.to_json();
+    if let Value::Object(map) = &mut value {
+        map.insert("source".into(), json!(source));
+        map.insert("target".into(), json!(target));
+        map.insert("dropped_points".into(), json!({ "source": dropped[0], "target": dropped[1] }));
+        map.insert("version".into(), json!(env!("CARGO_PKG_VERSION")));
+    }
+    value
+}
+
+/// The failure behind an error of the library, which knows no files.
+pub fn failed(error: &srrf::Error, source: &str, target: &str) -> Failure {
+    match error {
+        srrf::Error::Source(e) => Failure::cloud(source, e),
+        srrf::Error::Target(e) => Failure::cloud(target, e),
+        srrf::Error::Setup(problem) => Failure::Usage(problem.clone()),
+        srrf::Error::NoPose(_) | srrf::Error::Refine(_) => Failure::Other(format!(
+            "{source:?} and {target:?}: {error}; look at both with `srrf inspect`, or give a first guess with --initial"
+        )),
+    }
+}
+
+/// The warning about points that were left out.
+pub fn warning(name: &str, dropped: usize) -> Option<String> {
+    let were =
+        if dropped == 1 { "point with NaN or infinity was" } else { "points with NaN or infinity were" };
+    (dropped > 0).then(|| format!("{name}: {dropped} {were} left out."))
+}
+
+fn wrote(path: &Path, what: &str) -> String {
+    let name = if files::is_stream(path) { "standard output".to_owned() } else { path.display().to_string() };
+    format!("wrote {name}: {what}")
+}

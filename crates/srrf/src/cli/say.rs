@@ -1,0 +1,92 @@
+//! Lines for people: on standard output, or on standard error where that carries a result.
+
+use std::io::{self, Write};
+
+/// Where lines for people go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Voice {
+    /// Standard output.
+    Output,
+    /// Standard error, because standard output carries a result.
+    Aside,
+    /// Nowhere.
+    Quiet,
+}
+
+impl Voice {
+    /// The voice of a run.
+    pub fn new(quiet: bool, output_is_taken: bool) -> Self {
+        match (quiet, output_is_taken) {
+            (true, _) => Self::Quiet,
+            (false, true) => Self::Aside,
+            (false, false) => Self::Output,
+        }
+    }
+
+    /// Says a line. A reader that has gone away, as `head` does, is no failure.
+    pub fn say(self, line: &str) {
+        let _ = match self {
+            Self::Output => writeln!(io::stdout(), "{line}"),
+            Self::Aside => writeln!(io::stderr(), "{line}"),
+            Self::Quiet => Ok(()),
+        };
+    }
+}
+
+/// `1,234,567`.
+pub fn count(n: usize) -> String {
+    let digits = n.to_string();
+    let mut grouped = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+/// `1 point`, `1,234 points`.
+pub fn points(n: usize) -> String {
+    format!("{} point{}", count(n), if n == 1 { "" } else { "s" })
+}
+
+/// A length in `digits` significant digits, without an exponent for everyday sizes.
+pub fn length(value: f64, digits: i32) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if !(-5..15).contains(&exponent) {
+        return format!("{value:.*e}", digits.max(1) as usize - 1);
+    }
+    let decimals = (digits - 1 - exponent).max(0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// `(x, y, z)`, all with the decimals that `digits` significant digits of `scale` have.
+pub fn vector(v: [f64; 3], scale: f64, digits: i32) -> String {
+    let exponent = if scale > 0.0 && scale.is_finite() { scale.log10().floor() as i32 } else { 0 };
+    let decimals = (digits - 1 - exponent).clamp(0, 12) as usize;
+    let text = v.map(|c| format!("{c:.decimals$}"));
+    format!("({})", text.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures() {
+        assert_eq!(count(1_234_567), "1,234,567");
+        assert_eq!(points(1), "1 point");
+        for (value, text) in
+            [(0.012_345, "0.01234"), (12.5, "12.5"), (35_947.3, "35947"), (1e-7, "1.000e-7"), (0.0, "0")]
+        {
+            assert_eq!(length(value, 4), text);
+        }
+        assert_eq!(vector([500_000.123_456, -2.0, 0.1], 1.3, 4), "(500000.123, -2.000, 0.100)");
+        assert_eq!(Voice::new(true, true), Voice::Quiet);
+    }
+}

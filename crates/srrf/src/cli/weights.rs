@@ -1,0 +1,151 @@
+//! `srrf weights`: what models there are, their cards, and whether a file is whole.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+use srrf_model::weights::{LoadedModel, load, parameters};
+use srrf_model::{device, embedded};
+
+use super::failure::Failure;
+use super::files;
+use super::say::count;
+
+/// Model cards, by the name of the model.
+const CARDS: &[(&str, &str)] = &[
+    ("srrf-small", include_str!("../../../srrf-model/weights/srrf-small.md")),
+    ("srrf-shapes", include_str!("../../../srrf-model/weights/srrf-shapes.md")),
+];
+
+/// List the models in the program, show their cards, check files of weights.
+#[derive(Debug, Args)]
+pub struct WeightsArgs {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// List the models in the program (the default)
+    List,
+    /// Show the card of a model: what it was trained on, how well it does, where it fails
+    Show {
+        /// Its name
+        name: String,
+    },
+    /// Load weights, check that all numbers are finite, and print their SHA-256
+    Verify {
+        /// A file, or the name of a model in the program
+        weights: String,
+        /// The SHA-256 that it should have, in hexadecimal, or its first 8 digits or more
+        #[arg(long, value_name = "HEX")]
+        sha256: Option<String>,
+    },
+}
+
+/// Lists, shows or checks.
+///
+/// # Errors
+/// [`Failure`], with its exit code.
+pub fn run(args: &WeightsArgs) -> Result<ExitCode, Failure> {
+    let text = match &args.command {
+        None | Some(Command::List) => list()?,
+        Some(Command::Show { name }) => show(name)?.to_owned(),
+        Some(Command::Verify { weights, sha256 }) => verify(weights, sha256.as_deref())?,
+    };
+    files::write(Path::new("-"), format!("{}\n", text.trim_end()).as_bytes())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn list() -> Result<String, Failure> {
+    let mut lines = Vec::new();
+    for (i, name) in embedded::names().enumerate() {
+        let loaded = open(name)?;
+        let default = if i == 0 { ", the default" } else { "" };
+        lines.push(format!(
+            "{name:14} {} parameters, SHA-256 {}...{default}",
+            count(parameter_count(&loaded)),
+            &loaded.sha256[..16]
+        ));
+    }
+    lines.push("`srrf weights show NAME` prints the card of a model".to_owned());
+    Ok(lines.join("\n"))
+}
+
+fn show(name: &str) -> Result<&'static str, Failure> {
+    CARDS.iter().find(|(known, _)| *known == name).map(|(_, card)| *card).ok_or_else(|| unknown(name))
+}
+
+fn verify(weights: &str, sha256: Option<&str>) -> Result<String, Failure> {
+    let loaded = open(weights)?;
+    if let Some(wanted) = sha256 {
+        let wanted = wanted.trim().to_ascii_lowercase();
+        if wanted.len() < 8 || !wanted.chars().all(|c| c.is_ascii_hexdigit()) {
+            return Err(Failure::Usage(format!("--sha256 {wanted}: give 8 to 64 hexadecimal digits")));
+        }
+        if !loaded.sha256.starts_with(&wanted) {
+            return Err(Failure::Usage(format!(
+                "{weights:?}: its SHA-256 is {}, not {wanted}; the file is damaged or another one, get it again",
+                loaded.sha256
+            )));
+        }
+    }
+    let all = parameters(&loaded.model);
+    if let Some((name, _)) = all.iter().find(|(_, (_, values))| values.iter().any(|v| !v.is_finite())) {
+        return Err(Failure::Usage(format!(
+            "{weights:?}: parameter `{name}` has numbers that are not finite; train it again or get another file"
+        )));
+    }
+    let mut same = String::new();
+    for name in embedded::names() {
+        if open(name)?.sha256 == loaded.sha256 {
+            same = format!("\nthe same as {name} in this program");
+        }
+    }
+    let matches = if sha256.is_some() { "\nthe SHA-256 is the one that was asked for" } else { "" };
+    Ok(format!(
+        "{weights}: {}, complete, {} parameters, all finite\nSHA-256 {}{same}{matches}",
+        loaded.name,
+        count(parameter_count(&loaded)),
+        loaded.sha256
+    ))
+}
+
+fn open(weights: &str) -> Result<LoadedModel, Failure> {
+    let device = device("flex").map_err(|e| Failure::Other(e.to_string()))?;
+    let loaded = match embedded::load(weights, &device) {
+        Some(loaded) => loaded,
+        None if Path::new(weights).exists() => load(Path::new(weights), &device),
+        None => return Err(unknown(weights)),
+    };
+    loaded.map_err(|e| Failure::Usage(e.to_string()))
+}
+
+fn parameter_count(loaded: &LoadedModel) -> usize {
+    parameters(&loaded.model).values().map(|(_, values)| values.len()).sum()
+}
+
+fn unknown(name: &str) -> Failure {
+    let known: Vec<&str> = embedded::names().collect();
+    Failure::Usage(format!(
+        "{name:?}: no such file, and no model of that name; the program has {}",
+        known.join(", ")
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_model_has_its_card() {
+        assert_eq!(
+            embedded::names().collect::<Vec<_>>(),
+            CARDS.iter().map(|(name, _)| *name).collect::<Vec<_>>()
+        );
+        for name in embedded::names() {
+            assert!(show(name).unwrap().starts_with(&format!("# {name}")));
+        }
+        assert!(show("srrf-large").unwrap_err().to_string().contains("srrf-small"));
+    }
+}
