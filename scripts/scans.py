@@ -37,6 +37,7 @@ def read_bunny(folder):
         words = line.split()
         if len(words) >= 9 and words[0] == "bmesh" and (folder / words[1]).exists():
             t, (x, y, z, w) = np.array(words[2:5], float), np.array(words[5:9], float)
+            x, y, z, w = np.array([x, y, z, w]) / np.linalg.norm([x, y, z, w])
             rotation = np.array([
                 [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
                 [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -114,8 +115,8 @@ def by_small_gicp(source, target, voxel, threads):
 
 
 def errors(found, truth, source, target):
-    turn = found[:3, :3].T @ truth[:3, :3]
-    degrees = np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))
+    # |A - B| = 2 sqrt(2) sin(angle / 2): exact for small angles, where the arc cosine of the trace is not.
+    degrees = np.degrees(2 * np.arcsin(min(1, np.linalg.norm(found[:3, :3] - truth[:3, :3]) / 8**0.5)))
     centre = np.append(source.mean(0), 1)
     miss = np.linalg.norm((found @ centre - truth @ centre)[:3])
     radius = np.sqrt(((target - target.mean(0)) ** 2).sum(1).mean())
