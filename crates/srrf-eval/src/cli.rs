@@ -51,7 +51,7 @@ pub struct Options {
     #[arg(long, value_name = "NAME", default_value = "flex")]
     pub device: String,
 
-    /// Trained weights: a file, or `srrf-small` or `srrf-shapes` in the program [default: srrf-small]
+    /// Trained weights: a file, or `srrf-small`, `srrf-small-start` or `srrf-shapes` in the program [default: srrf-small]
     #[arg(long, value_name = "PATH")]
     pub weights: Option<PathBuf>,
 

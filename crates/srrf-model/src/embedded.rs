@@ -8,6 +8,7 @@ use crate::weights::{LoadedModel, WeightsError, from_safetensors};
 /// The first is the default.
 const EMBEDDED: &[(&str, &[u8])] = &[
     ("srrf-small", include_bytes!("../weights/srrf-small.safetensors")),
+    ("srrf-small-start", include_bytes!("../weights/srrf-small-start.safetensors")),
     ("srrf-shapes", include_bytes!("../weights/srrf-shapes.safetensors")),
 ];
 
@@ -16,8 +17,9 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     EMBEDDED.iter().map(|(name, _)| *name)
 }
 
-/// An embedded model by name: `srrf-small` (trained on ModelNet40, the default) or `srrf-shapes`
-/// (trained on the built-in shapes). `None` if there is no model of that name.
+/// An embedded model by name: `srrf-small` (trained on ModelNet40, the default), `srrf-small-start`
+/// (what its training started from) or `srrf-shapes` (trained on the built-in shapes). `None` if there
+/// is no model of that name.
 pub fn load(name: &str, device: &Device) -> Option<Result<LoadedModel, WeightsError>> {
     let (name, bytes) = EMBEDDED.iter().find(|(known, _)| *known == name)?;
     Some(from_safetensors(bytes, &format!("embedded weights {name}"), device))
@@ -43,7 +45,7 @@ mod tests {
         for name in names() {
             assert_eq!(load(name, &device).unwrap().unwrap().name, name);
         }
-        assert_eq!(names().count(), 2);
+        assert_eq!(names().count(), 3);
         assert!(load("srrf-large", &device).is_none());
         assert_eq!(load_default(&device).unwrap().name, "srrf-small");
     }

@@ -45,8 +45,3 @@ pub use sem_loss::{SkeletonLoss, SkeletonLossConfig, chamfer, skeleton_loss, spr
 pub use sfe::{Sfe, SfeConfig};
 pub use sizes::WrongSize;
 pub use srrf::{Srrf, SrrfConfig, SrrfOutput};
-
-/// The README's example compiles.
-#[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
-struct Readme;

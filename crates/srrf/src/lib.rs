@@ -52,3 +52,8 @@ pub fn register(source: &PointCloud, target: &PointCloud) -> Result<Outcome, Err
         Err(problem) => Err(Error::Setup(problem.clone())),
     }
 }
+
+/// The README's example compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
