@@ -49,8 +49,7 @@ mod tests {
     #[test]
     fn directions_are_even() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let mean: Vector3<f64> =
-            (0..4000).map(|_| random_direction(&mut rng)).sum::<Vector3<f64>>() / 4000.0;
+        let mean: Vector3<f64> = (0..4000).map(|_| random_direction(&mut rng)).sum::<Vector3<f64>>() / 4000.0;
         assert!(mean.norm() < 0.05, "{mean}");
     }
 }

@@ -22,8 +22,8 @@
 //! ```
 
 mod corruption;
-pub mod crop;
 pub mod corruptions;
+pub mod crop;
 mod kind;
 mod normalize;
 mod pair;

@@ -11,7 +11,9 @@ use burn::optim::{AdamConfig, AdamWConfig, ModuleOptimizer};
 use burn::tensor::Device;
 use srrf_cloud::source::ShapeSource;
 use srrf_corrupt::{Pair, Severity};
-use srrf_model::weights::{load as load_weights, parameters, to_safetensors, with_parameters, write_atomically};
+use srrf_model::weights::{
+    load as load_weights, parameters, to_safetensors, with_parameters, write_atomically,
+};
 use srrf_model::{Srrf, embedded, init};
 
 use crate::checkpoint::{self, CheckpointError, Progress};
@@ -381,8 +383,7 @@ fn starting_model(start: &str, config: &TrainConfig, device: &Device) -> Result<
             _ => return Err(RunError::Start { start: start.to_string(), name }),
         }
     }
-    with_parameters(fresh, values)
-        .map_err(|(name, _)| RunError::Start { start: start.to_string(), name })
+    with_parameters(fresh, values).map_err(|(name, _)| RunError::Start { start: start.to_string(), name })
 }
 
 fn merge((sums, count): &mut (Losses, usize), losses: Losses) {

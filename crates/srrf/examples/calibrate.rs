@@ -57,7 +57,11 @@ fn main() {
     let what = format!(
         "{} pairs of {}; 12 corruptions, clean and cropped, severities 1 to 5, seed {SEED}",
         fitted.len(),
-        if modelnet.is_some() { "built-in shapes and validation shapes of ModelNet40's training split" } else { "built-in shapes" },
+        if modelnet.is_some() {
+            "built-in shapes and validation shapes of ModelNet40's training split"
+        } else {
+            "built-in shapes"
+        },
     );
     let model = Logistic::fit(&pairs_of(fitted), 10.0, what).unwrap();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("calibration.json");
@@ -67,7 +71,9 @@ fn main() {
     reliability(examples.iter().map(|e| (e.probability, e.right)));
     println!("the new file, on the held-out pairs:");
     reliability(held_out.iter().map(|(_, e)| (model.probability(&e.features), e.right)));
-    println!("\n| pairs | right | mean probability | abstained | right of the others | right of the abstained |");
+    println!(
+        "\n| pairs | right | mean probability | abstained | right of the others | right of the abstained |"
+    );
     println!("|---|---|---|---|---|---|");
     let mut rows: Vec<&str> = examples.iter().map(|e| e.row.as_str()).collect();
     rows.sort_unstable();
@@ -111,7 +117,9 @@ fn pair(
     let severity = Severity::ALL[rng.random_range(0..5)];
     let sampling = if rng.random_bool(0.4) { Sampling::Independent } else { Sampling::Shared };
     let (shapes, points): (&dyn ShapeSource, usize) = match modelnet {
-        Some(shapes) if rng.random_bool(0.5) => (shapes, if sampling == Sampling::Shared { 1024 } else { 512 }),
+        Some(shapes) if rng.random_bool(0.5) => {
+            (shapes, if sampling == Sampling::Shared { 1024 } else { 512 })
+        }
         _ => (built_in, 1024),
     };
     let shape = if points == 512 || shapes.len() > 1000 {
@@ -171,8 +179,16 @@ fn reliability(pairs: impl Iterator<Item = (f64, bool)>) {
         let mean = inside.iter().map(|(p, _)| p).sum::<f64>() / k;
         let right = inside.iter().map(|(_, r)| value(*r)).sum::<f64>() / k;
         error += k / n * (mean - right).abs();
-        println!("| {:.1} to {:.1} | {} | {mean:.2} | {right:.2} |", bin as f64 / 10.0, (bin + 1) as f64 / 10.0, inside.len());
+        println!(
+            "| {:.1} to {:.1} | {} | {mean:.2} | {right:.2} |",
+            bin as f64 / 10.0,
+            (bin + 1) as f64 / 10.0,
+            inside.len()
+        );
     }
     let right = pairs.iter().filter(|(_, r)| *r).count() as f64 / n;
-    println!("{} pairs, right {right:.3}, Brier score {brier:.4}, expected calibration error {error:.3}\n", pairs.len());
+    println!(
+        "{} pairs, right {right:.3}, Brier score {brier:.4}, expected calibration error {error:.3}\n",
+        pairs.len()
+    );
 }

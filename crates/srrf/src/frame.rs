@@ -54,8 +54,10 @@ mod tests {
     fn poses_come_back_far_from_the_origin() {
         let points = vec![[5e5, 4e6, 120.0], [5e5 + 2.0, 4e6 + 1.0, 121.5], [5e5 - 1.0, 4e6 + 3.0, 119.0]];
         let source = PointCloud::new(points).unwrap();
-        let motion =
-            Rigid { rotation: EulerXyz::from_deg([1.0, 2.0, 30.0]).to_matrix(), translation: [3e5, -2e5, 4.0].into() };
+        let motion = Rigid {
+            rotation: EulerXyz::from_deg([1.0, 2.0, 30.0]).to_matrix(),
+            translation: [3e5, -2e5, 4.0].into(),
+        };
         let target = source.transformed(&motion);
         let (s, t) = (Centred::new(&source).unwrap(), Centred::new(&target).unwrap());
         assert!(s.cloud.points().iter().flatten().all(|v| v.abs() < 3.0));

@@ -29,7 +29,12 @@ pub struct Features(pub [f64; FEATURES]);
 impl Features {
     /// The features of a pose. `rivals` are poses of other starts after their short run, with their
     /// support; one counts as another pose when it is turned by more than 5 degrees.
-    pub fn new(evidence: &Evidence, refinement: Option<&Refinement>, pose: &Rigid, rivals: &[(Rigid, f64)]) -> Self {
+    pub fn new(
+        evidence: &Evidence,
+        refinement: Option<&Refinement>,
+        pose: &Rigid,
+        rivals: &[(Rigid, f64)],
+    ) -> Self {
         let support = refinement.map_or(evidence.fitness, |r| r.support);
         let apart = |other: &Rigid| pose.angle_to_deg(other) > 5.0;
         let rival = rivals.iter().filter(|(p, _)| apart(p)).map(|(_, s)| *s).fold(0.0, f64::max);
@@ -93,7 +98,8 @@ impl Logistic {
     /// # Errors
     /// In words, if the file in the program was damaged at build time.
     pub fn embedded() -> Result<Self, String> {
-        let model: Self = serde_json::from_str(include_str!("../calibration.json")).map_err(|e| e.to_string())?;
+        let model: Self =
+            serde_json::from_str(include_str!("../calibration.json")).map_err(|e| e.to_string())?;
         let count = Features([0.0; FEATURES]).expanded().len();
         let fits = [&model.mean, &model.deviation, &model.weights].iter().all(|v| v.len() == count);
         if fits { Ok(model) } else { Err(format!("calibration.json does not hold {count} weights")) }
@@ -127,8 +133,10 @@ impl Logistic {
             .collect();
         let standard = |r: usize, c: usize| ((rows[r][c] - mean[c]) / deviation[c]).clamp(-4.0, 4.0);
         // The last column is the constant.
-        let x = DMatrix::from_fn(rows.len(), columns + 1, |r, c| if c < columns { standard(r, c) } else { 1.0 });
-        let y = DVector::from_iterator(rows.len(), examples.iter().map(|(_, right)| f64::from(u8::from(*right))));
+        let x =
+            DMatrix::from_fn(rows.len(), columns + 1, |r, c| if c < columns { standard(r, c) } else { 1.0 });
+        let y =
+            DVector::from_iterator(rows.len(), examples.iter().map(|(_, right)| f64::from(u8::from(*right))));
         let mut beta = DVector::zeros(columns + 1);
         for _ in 0..30 {
             let p = (&x * &beta).map(|z: f64| 1.0 / (1.0 + (-z).exp()));

@@ -77,9 +77,9 @@ impl Registrar {
             config.validate().map_err(Error::Refine)?;
         }
         let network = match options.method {
-            Method::Auto | Method::Srrf => Some(
-                Network::load(options.weights.as_deref(), &options.device).map_err(Error::Setup)?,
-            ),
+            Method::Auto | Method::Srrf => {
+                Some(Network::load(options.weights.as_deref(), &options.device).map_err(Error::Setup)?)
+            }
             _ => None,
         };
         Ok(Self { options, network, calibration: Logistic::embedded().map_err(Error::Setup)? })
@@ -232,7 +232,13 @@ impl Registrar {
             let evidence = target.refine.evidence(source, first).map_err(Error::Refine)?;
             let features = Features::new(&evidence, None, first, &[]);
             let probability = self.calibration.probability(&features);
-            return Ok(Round { pose: *first, start: first_name.clone(), refinement: None, features, probability });
+            return Ok(Round {
+                pose: *first,
+                start: first_name.clone(),
+                refinement: None,
+                features,
+                probability,
+            });
         }
         let refined = target.refine.refine(source, &named).map_err(Error::Refine)?;
         let rivals: Vec<(Rigid, f64)> =
