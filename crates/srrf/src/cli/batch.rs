@@ -59,10 +59,10 @@ pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
     let registrar = Registrar::new(options.clone()).map_err(|e| Failure::Usage(e.to_string()))?;
     let described = args.describe();
     let (results, done) = Results::open(&args.out, &pairs.rows, &described)?;
-    let todo: Vec<&PairRow> = pairs.rows.iter().filter(|row| !done.contains(&row.number)).collect();
+    let todo: Vec<&PairRow> = pairs.rows.iter().filter(|row| !done.contains_key(&row.number)).collect();
     let voice = Voice::new(args.common.quiet, files::is_stream(&args.out));
     if !done.is_empty() {
-        voice.say(&format!("{} of {} pairs are done already", count(done.len()), count(pairs.rows.len())));
+        voice.say(&format!("{} of {} done already", count(done.len()), pairs_of(pairs.rows.len())));
     }
     interrupt::advise("; the same command goes on where this one stopped");
 
@@ -70,14 +70,26 @@ pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
     let batch = Batch { pairs: &pairs, registrar: &registrar, options: &options, described: &described };
     let tally = batch.run(&todo, threads, results, &bar)?;
     bar.finish_and_clear();
+    let before = done.values().filter(|has_pose| !**has_pose).count();
     voice.say(&format!(
-        "{} pairs: {} probably right, {} abstained, {} without a pose",
-        count(todo.len()),
+        "{}: {} probably right, {} abstained, {} without a pose",
+        pairs_of(todo.len()),
         count(todo.len() - tally.abstained - tally.failed),
         count(tally.abstained),
         count(tally.failed)
     ));
-    Ok(if tally.failed > 0 { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    if before > 0 {
+        voice.say(&format!(
+            "{} done before without a pose: delete their lines to try again",
+            pairs_of(before)
+        ));
+    }
+    Ok(if tally.failed + before > 0 { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+/// `1 pair`, `1,234 pairs`.
+fn pairs_of(n: usize) -> String {
+    format!("{} pair{}", count(n), if n == 1 { "" } else { "s" })
 }
 
 impl BatchArgs {

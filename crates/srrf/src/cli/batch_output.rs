@@ -1,6 +1,6 @@
 //! The results of a batch: one JSON line a pair, in the order of the list, and only whole lines.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -22,17 +22,22 @@ pub struct Results {
 }
 
 impl Results {
-    /// Opens a file, and finds the pairs that are in it already: of an interrupted run.
+    /// Opens a file, and finds the pairs that are in it already, of an interrupted run: their numbers, and
+    /// whether they have a pose.
     ///
     /// # Errors
     /// [`Failure::Usage`] for a file that holds anything but results of `rows` with `options`;
     /// [`Failure::Other`] where it cannot be written.
-    pub fn open(path: &Path, rows: &[PairRow], options: &Value) -> Result<(Self, BTreeSet<usize>), Failure> {
+    pub fn open(
+        path: &Path,
+        rows: &[PairRow],
+        options: &Value,
+    ) -> Result<(Self, BTreeMap<usize, bool>), Failure> {
         if files::is_stream(path) {
             let out = Box::new(io::stdout());
             return Ok((
                 Self { path: path.to_owned(), out, next: 0, waiting: BTreeMap::new() },
-                BTreeSet::new(),
+                BTreeMap::new(),
             ));
         }
         let failed =
@@ -75,9 +80,13 @@ impl Results {
     }
 }
 
-/// Numbers of the pairs in a file of results. The error is the line and what is wrong with it.
-fn finished(text: &[u8], rows: &[PairRow], options: &Value) -> Result<BTreeSet<usize>, (usize, String)> {
-    let mut done = BTreeSet::new();
+/// The pairs in a file of results, and whether they have a pose. The error is the line and what is wrong with it.
+fn finished(
+    text: &[u8],
+    rows: &[PairRow],
+    options: &Value,
+) -> Result<BTreeMap<usize, bool>, (usize, String)> {
+    let mut done = BTreeMap::new();
     for (number, line) in (1..).zip(text.split(|b| *b == b'\n')) {
         if line.trim_ascii().is_empty() {
             continue;
@@ -97,7 +106,7 @@ fn finished(text: &[u8], rows: &[PairRow], options: &Value) -> Result<BTreeSet<u
         if value["options"] != *options {
             return Err((number, format!("made with other options ({})", value["options"])));
         }
-        done.insert(row.number);
+        done.insert(row.number, value.get("error").is_none());
     }
     Ok(done)
 }
@@ -129,13 +138,15 @@ mod tests {
         let options = json!({ "seed": 1 });
         std::fs::write(&path, format!("{}\n{{\"pair\": 2, \"sou", line(1, "a"))).unwrap();
         let (mut results, done) = Results::open(&path, &rows(), &options).unwrap();
-        assert_eq!(done, BTreeSet::from([1]));
+        assert_eq!(done, BTreeMap::from([(1, true)]));
         results.put(1, &line(3, "c")).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 1);
-        results.put(0, &line(2, "b")).unwrap();
+        let mut without = line(2, "b");
+        without["error"] = json!("no pose");
+        results.put(0, &without).unwrap();
         drop(results);
         let (_, done) = Results::open(&path, &rows(), &options).unwrap();
-        assert_eq!(done, BTreeSet::from([1, 2, 3]));
+        assert_eq!(done, BTreeMap::from([(1, true), (2, false), (3, true)]));
         let text = std::fs::read_to_string(&path).unwrap();
         let order: Vec<u64> = text
             .lines()

@@ -63,7 +63,7 @@ impl From<IoError> for Failure {
 
 fn way_out(error: &CloudError) -> &'static str {
     match error {
-        CloudError::Empty => "; is it the right file, and are its points not all NaN?",
+        CloudError::Empty => "; is it the right file?",
         CloudError::NotFinite { .. } => "; remove such points first",
         CloudError::TooFew { .. } | CloudError::Collinear => {
             "; take a cloud with three points or more that are not on one line"

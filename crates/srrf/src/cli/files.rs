@@ -2,12 +2,12 @@
 
 use std::fs::File;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use srrf_cloud::io::{
     CloudFile, IoError, Kept, is_cloud_file, write_atomically, write_cloud, write_cloud_to,
 };
-use srrf_cloud::{PointCloud, Rigid};
+use srrf_cloud::{CloudError, PointCloud, Rigid};
 
 use super::failure::Failure;
 use super::interrupt;
@@ -44,8 +44,22 @@ pub fn read(path: &Path, format: Option<&str>) -> Result<Input, Failure> {
             )));
         }
     };
-    let (cloud, dropped) = file.cloud_dropping_nan()?;
+    let (cloud, dropped) = match file.cloud_dropping_nan() {
+        Err(IoError::Cloud { path, source: CloudError::Empty }) => return Err(nothing_left(&file, path)),
+        read => read?,
+    };
     Ok(Input { name: path.display().to_string(), file, cloud, dropped })
+}
+
+/// No point is there, or none that is finite.
+fn nothing_left(file: &CloudFile, path: PathBuf) -> Failure {
+    match file.points() {
+        Ok(points) => Failure::Usage(format!(
+            "{path:?}: each of its {} points has a coordinate that is NaN or infinite; write the file again with numbers",
+            points.len()
+        )),
+        Err(_) => IoError::Cloud { path, source: CloudError::Empty }.into(),
+    }
 }
 
 /// As [`read`], of a cloud that determines a rotation.
@@ -61,7 +75,7 @@ pub fn read_solid(path: &Path, format: Option<&str>) -> Result<Input, Failure> {
 /// Checks, before any work is done, that there is a place for `path`.
 ///
 /// # Errors
-/// [`Failure::Usage`] for a folder, or a file in a folder that does not exist.
+/// [`Failure::Usage`] for a folder, or a file in a folder that does not exist or takes no files.
 pub fn check_output(path: &Path) -> Result<(), Failure> {
     if is_stream(path) {
         return Ok(());
@@ -69,12 +83,20 @@ pub fn check_output(path: &Path) -> Result<(), Failure> {
     if path.is_dir() {
         return Err(Failure::Usage(format!("cannot write {path:?}: it is a folder; name a file in it")));
     }
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => Err(Failure::Usage(format!(
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return Err(Failure::Usage(format!(
             "cannot write {path:?}: the folder {folder:?} does not exist; create it first"
-        ))),
-        _ => Ok(()),
+        )));
     }
+    if is_special(path) {
+        return Ok(());
+    }
+    tempfile::tempfile_in(folder).map(|_| ()).map_err(|e| {
+        Failure::Usage(format!(
+            "cannot write {path:?}: no file can be made in {folder:?} ({e}); choose another place"
+        ))
+    })
 }
 
 /// As [`check_output`], for a cloud, whose extension says the format.

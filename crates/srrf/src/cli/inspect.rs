@@ -106,11 +106,12 @@ fn to_text(input: &Input, s: &Statistics) -> String {
     line(
         "figures",
         format!(
-            "outliers {:.2} % of {} asked, repeated {:.2} %, clustering {:.2}, off local planes {:.2} spacings",
+            "outliers {:.2} % of {} asked, repeated {:.2} %, crowding {:.2}, thinning {:.2}, roughness {:.2} spacings",
             100.0 * s.outliers,
             count(s.asked),
             100.0 * s.duplicates,
             s.clustering,
+            s.thinning,
             s.roughness
         ),
     );
