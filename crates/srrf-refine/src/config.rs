@@ -66,7 +66,8 @@ pub struct RefineConfig {
     /// neighbours on planes are as exact, and faster.
     pub soft_points: usize,
     /// Whether to look for deformation, which makes exact alignment worthless, and then to go only
-    /// halfway ([`crate::Verdict::Deformed`]). Default true; clouds of more than `coarse_points` are exempt.
+    /// halfway ([`crate::Verdict::Deformed`]). Default true; clouds of more than `coarse_points` are exempt. Switch it off
+    /// for small clouds that are two samplings of a rigid surface, where it errs (`docs/experiments.md`).
     pub check_deformation: bool,
 }
 
