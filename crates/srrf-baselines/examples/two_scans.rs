@@ -16,6 +16,9 @@ use srrf_cloud::source::ShapeSource;
 use srrf_cloud::{EulerXyz, PointCloud, Register, Rigid, io, shapes::ProceduralShapes};
 use srrf_refine::{RefineConfig, refine};
 
+/// The built-in shape: one that no rotation maps onto itself.
+const SHAPE: usize = 5;
+
 fn main() -> Result<(), Box<dyn Error>> {
     let files: Vec<String> = std::env::args().skip(1).collect();
     let (source, target, truth) = match &files[..] {
@@ -80,9 +83,9 @@ fn matrix(path: &Path) -> Result<Rigid, Box<dyn Error>> {
 
 /// Two partial samplings of one surface, and the pose between them.
 fn generated() -> Result<(PointCloud, PointCloud, Rigid), Box<dyn Error>> {
-    let shapes = ProceduralShapes::new(7, 5, None)?;
+    let shapes = ProceduralShapes::new(7, 9, None)?;
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let (a, b) = shapes.sample_two(0, 42_000, &mut rng)?;
+    let (a, b) = shapes.sample_two(SHAPE, 42_000, &mut rng)?;
     let cut = |cloud: PointCloud, keep: fn(&[f64; 3]) -> f64| {
         let mut points = cloud.into_points();
         points.sort_by(|p, q| keep(p).total_cmp(&keep(q)));

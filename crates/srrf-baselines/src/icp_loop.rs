@@ -50,7 +50,7 @@ impl Scene {
         &self,
         max_iterations: usize,
         tolerance: f64,
-        mut weigh: impl FnMut(&[f64]) -> Vec<f64>,
+        weigh: impl Fn(&[f64], usize) -> Vec<f64>,
     ) -> Result<Registration, RegisterError> {
         let metric = if self.normals.is_some() { (0.01, 1.0) } else { (1.0, 0.0) };
         let mut pose = Rigid { rotation: Rigid::identity().rotation, translation: -self.target_mean };
@@ -59,7 +59,7 @@ impl Scene {
             let matches: Vec<Match> =
                 self.source.iter().map(|p| self.nearest(&(pose.rotation * p + pose.translation))).collect();
             let squared: Vec<f64> = matches.iter().map(|m| (m.moved - m.fixed).norm_squared()).collect();
-            let weights = weigh(&squared);
+            let weights = weigh(&squared, iterations);
             let mut sums = NormalEquations::default();
             for (m, w) in matches.iter().zip(&weights).filter(|(_, w)| **w > 0.0) {
                 sums.add(m, metric.0 * w, metric.1 * w);

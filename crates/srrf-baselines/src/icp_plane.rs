@@ -49,7 +49,7 @@ impl Register for IcpPlane {
         let config = &self.config;
         let limit = config.max_distance.map_or(f64::INFINITY, |d| d * d);
         let scene = Scene::new(source, target, Some(config.normal_neighbours))?;
-        scene.run(config.max_iterations, config.tolerance, |squared| {
+        scene.run(config.max_iterations, config.tolerance, |squared, _| {
             squared.iter().map(|r| if *r <= limit { 1.0 } else { 0.0 }).collect()
         })
     }

@@ -58,7 +58,7 @@ impl Register for IcpRobust {
         let config = &self.config;
         let scene = Scene::new(source, target, config.normal_neighbours)?;
         let least = (config.least_spacings * scene.spacing).max(f64::MIN_POSITIVE);
-        scene.run(config.max_iterations, config.tolerance, |squared| {
+        scene.run(config.max_iterations, config.tolerance, |squared, _| {
             let mut sorted = squared.to_vec();
             let median = sorted.select_nth_unstable_by(squared.len() / 2, f64::total_cmp).1.sqrt();
             let scale = (config.medians * median).max(least).powi(2);

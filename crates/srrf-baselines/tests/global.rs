@@ -1,5 +1,7 @@
 //! What the methods of this crate must do, on built-in shapes.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
 use srrf_baselines::{Fgr, FpfhRansac, IcpPlane, IcpRobust, IcpTrimmed};
 use srrf_cloud::shapes::ProceduralShapes;
 use srrf_cloud::{CloudError, EulerXyz, PointCloud, Register, RegisterError, Rigid};
