@@ -20,15 +20,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// A scan, and the pose that lays it on the map.
+pub type Scan = (PointCloud, Rigid);
+
 /// Registers all scans to one map.
-pub fn register_all(map: &PointCloud, scans: &[(PointCloud, Rigid)]) -> Result<Vec<Outcome>, Box<dyn Error>> {
+pub fn register_all(map: &PointCloud, scans: &[Scan]) -> Result<Vec<Outcome>, Box<dyn Error>> {
     let registrar = Registrar::new(Options { rotation: RotationRange::Within45, ..Options::default() })?;
     let target = registrar.prepare(map)?;
     Ok(scans.iter().map(|(scan, _)| registrar.register_to(scan, &target)).collect::<Result<_, _>>()?)
 }
 
-/// A shape, and scans of it with the poses that lay them on it.
-pub fn map_and_scans(count: u32) -> Result<(PointCloud, Vec<(PointCloud, Rigid)>), Box<dyn Error>> {
+/// A shape, and scans of it.
+pub fn map_and_scans(count: u32) -> Result<(PointCloud, Vec<Scan>), Box<dyn Error>> {
     let shapes = ProceduralShapes::new(5, 1, Some(&["chair"]))?;
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let map = shapes.sample(0, 4000, &mut rng)?;

@@ -2,12 +2,8 @@
 
 mod common;
 
-use common::{Scene, pose_of_json};
+use common::{Scene, lines, pose_of_json};
 use serde_json::Value;
-
-fn lines(text: &str) -> Vec<Value> {
-    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
-}
 
 #[test]
 fn goes_on_where_it_stopped() {

@@ -1,5 +1,5 @@
 //! What the tests of the program share: the program, and clouds made on the spot.
-#![allow(dead_code, reason = "each test uses a part")]
+#![allow(dead_code, clippy::unwrap_used, reason = "each test uses a part; what fails here fails the test")]
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -138,4 +138,9 @@ fn pose_of_rows(rows: &[Vec<f64>]) -> Rigid {
 /// JSON from a file.
 pub fn json(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// JSON from each line of a text.
+pub fn lines(text: &str) -> Vec<Value> {
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
