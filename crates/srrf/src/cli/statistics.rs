@@ -107,8 +107,8 @@ impl Statistics {
         }
         if self.outliers > MANY_OUTLIERS {
             found.push(format!(
-                "stray points or clutter: {:.1} % of {} asked points lie {OUTLIER_FACTOR} times farther from their \
-                 neighbours than is usual here",
+                "stray points, clutter, or a density that falls with the distance from the scanner: {:.1} % of {} asked \
+                 points lie {OUTLIER_FACTOR} times farther from their neighbours than the median",
                 100.0 * self.outliers,
                 self.asked
             ));
