@@ -35,7 +35,7 @@ impl Network {
     ///
     /// # Errors
     /// [`RegisterError`] for clouds that it cannot take.
-    pub fn from_start(
+    pub fn look_from(
         &self,
         source: &PointCloud,
         target: &PointCloud,

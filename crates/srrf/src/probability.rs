@@ -53,6 +53,11 @@ impl Features {
         ])
     }
 
+    /// Share of the source that lies on the target.
+    pub fn fitness(&self) -> f64 {
+        self.0[0]
+    }
+
     /// The features by name.
     pub fn to_json(&self) -> Value {
         let entries: serde_json::Map<String, Value> =

@@ -135,7 +135,7 @@ impl Registrar {
         let mut starts: Vec<Start> = Vec::new();
         if let Some(net) = &self.network {
             let centre_to_centre = turned(given.rotation);
-            match net.from_start(&thin, &target.thin, &centre_to_centre) {
+            match net.look_from(&thin, &target.thin, &centre_to_centre) {
                 Ok(found) => {
                     starts.extend(poses_of(&found, "network"));
                     network = Some(self.coarse(&found, &centred, target));
@@ -176,7 +176,7 @@ impl Registrar {
                 .enumerate()
                 .filter_map(|(i, rotation)| {
                     let start = turned(given.rotation * rotation);
-                    let found = net.from_start(&thin, &target.thin, &start).ok()?;
+                    let found = net.look_from(&thin, &target.thin, &start).ok()?;
                     Some((format!("network, orientation {}", i + 1), found.target_from_source))
                 })
                 .collect();
@@ -231,7 +231,7 @@ impl Registrar {
         if self.options.refine.is_none() {
             let evidence = target.refine.evidence(source, first).map_err(Error::Refine)?;
             let features = Features::new(&evidence, None, first, &[]);
-            let probability = self.calibration.probability(&features);
+            let probability = self.probability(&features);
             return Ok(Round {
                 pose: *first,
                 start: first_name.clone(),
@@ -245,8 +245,17 @@ impl Registrar {
             refined.starts.iter().map(|s| (s.target_from_source, s.support)).collect();
         let pose = refined.target_from_source;
         let features = Features::new(&refined.evidence, Some(&refined), &pose, &rivals);
-        let probability = self.calibration.probability(&features);
+        let probability = self.probability(&features);
         Ok(Round { pose, start: refined.start.clone(), features, probability, refinement: Some(refined) })
+    }
+
+    /// The calibrated probability. It was fitted on [`Method::Auto`] with refinement; for other methods, whose
+    /// few starts give no rivals to compare with, and for poses without refinement, it is kept below the square
+    /// of the fitness, which only errs on the side of doubt.
+    fn probability(&self, features: &Features) -> f64 {
+        let fitted = self.calibration.probability(features);
+        let known = self.options.method == Method::Auto && self.options.refine.is_some();
+        if known { fitted } else { fitted.min(features.fitness().powi(2)) }
     }
 
     fn global(&self, source: &PointCloud, target: &PointCloud) -> Result<Rigid, RegisterError> {

@@ -101,7 +101,6 @@ fn doubt_has_an_exit_code_of_its_own() {
 }
 
 #[test]
-#[ignore = "the probability is not yet fitted to poses that were not refined"]
 fn a_pose_with_no_inlier_is_doubtful() {
     let scene = Scene::new(800);
     let done = scene.srrf(&[
