@@ -22,7 +22,8 @@ pub fn open(path: Option<&Path>, shapes: usize) -> Result<Box<dyn ShapeSource>, 
         (None, Some(path)) => (path, "The path was given by the environment variable SRRF_DATA."),
         (None, None) => return procedural(shapes),
     };
-    source::open(&path, Split::Test).map_err(|source| EvalError::Data { origin: origin.into(), source })
+    let named = |source| EvalError::Data { origin: origin.into(), source: Box::new(source) };
+    source::open(&path, Split::Test).map_err(named)
 }
 
 /// `shapes` procedural shapes for scoring.

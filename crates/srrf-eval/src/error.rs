@@ -22,7 +22,7 @@ pub enum EvalError {
         /// Where the path came from.
         origin: String,
         /// What is wrong with it.
-        source: SourceError,
+        source: Box<SourceError>,
     },
     /// A shape cannot be read.
     #[error("{0}")]
