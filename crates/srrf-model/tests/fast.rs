@@ -4,6 +4,7 @@
 //! Tolerances: `f32` sums of up to 50 products of numbers below 1 carry relative errors of some 1e-6,
 //! so 2e-5 of the largest entry. Central differences with a step of 1/64 have errors of its square
 //! times the third derivative, below 1, and of the rounding of the output over the step: 1e-3.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod common;
 
