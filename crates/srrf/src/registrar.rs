@@ -5,7 +5,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use srrf_baselines::{FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid};
-use srrf_refine::{RefineError, RefineTarget, Refinement};
+use srrf_refine::{Evidence, RefineError, RefineTarget, Refinement};
 
 use crate::frame::{Centred, from_input, to_input};
 use crate::network::{Network, thinned};
@@ -63,6 +63,7 @@ struct Round {
     pose: Rigid,
     start: String,
     refinement: Option<Refinement>,
+    evidence: Evidence,
     features: Features,
     probability: f64,
 }
@@ -123,10 +124,8 @@ impl Registrar {
         source.check_rotation_observable().map_err(Error::Source)?;
         let centred = Centred::new(source).map_err(Error::Source)?;
         let thin = thinned(&centred.cloud);
-        let given = match &self.options.given {
-            Some(pose) => from_input(pose, &centred, &target.centred),
-            None => from_input(&Rigid::identity(), &centred, &target.centred),
-        };
+        let given = self.options.given.unwrap_or_else(Rigid::identity);
+        let given = from_input(&given, &centred, &target.centred);
         clock.lap("prepare source");
 
         // The first round: one look of the network, FPFH with RANSAC, the given pose.
@@ -160,7 +159,7 @@ impl Registrar {
             }
             Method::Srrf | Method::Given => {}
         }
-        if self.options.method == Method::Given || (self.options.method == Method::Auto) {
+        if matches!(self.options.method, Method::Given | Method::Auto) {
             starts.push(("given".to_owned(), given));
         }
         let mut best = self.round(&centred.cloud, target, &starts, &warnings)?;
@@ -186,10 +185,6 @@ impl Registrar {
             clock.lap("refine again");
         }
 
-        let evidence = match &best.refinement {
-            Some(refinement) => refinement.evidence.clone(),
-            None => target.refine.evidence(&centred.cloud, &best.pose).map_err(Error::Refine)?,
-        };
         let abstain = best.probability < self.options.abstain_below;
         if abstain {
             warnings.push(format!(
@@ -206,7 +201,7 @@ impl Registrar {
             start: best.start,
             network,
             refinement: best.refinement,
-            evidence,
+            evidence: best.evidence,
             features: best.features,
             points: PointCounts { source: source.len(), target: target.points },
             times: clock.times,
@@ -227,26 +222,23 @@ impl Registrar {
         let Some((first_name, first)) = starts.first() else {
             return Err(Error::NoPose(warnings.join(" ")));
         };
-        let named: Vec<(&str, Rigid)> = starts.iter().map(|(name, pose)| (name.as_str(), *pose)).collect();
         if self.options.refine.is_none() {
+            // The evidence of a coarse pose takes a look of its own; a refinement brings it along.
             let evidence = target.refine.evidence(source, first).map_err(Error::Refine)?;
             let features = Features::new(&evidence, None, first, &[]);
             let probability = self.probability(&features);
-            return Ok(Round {
-                pose: *first,
-                start: first_name.clone(),
-                refinement: None,
-                features,
-                probability,
-            });
+            let (pose, start) = (*first, first_name.clone());
+            return Ok(Round { pose, start, refinement: None, evidence, features, probability });
         }
+        let named: Vec<(&str, Rigid)> = starts.iter().map(|(name, pose)| (name.as_str(), *pose)).collect();
         let refined = target.refine.refine(source, &named).map_err(Error::Refine)?;
         let rivals: Vec<(Rigid, f64)> =
             refined.starts.iter().map(|s| (s.target_from_source, s.support)).collect();
         let pose = refined.target_from_source;
         let features = Features::new(&refined.evidence, Some(&refined), &pose, &rivals);
         let probability = self.probability(&features);
-        Ok(Round { pose, start: refined.start.clone(), features, probability, refinement: Some(refined) })
+        let (start, evidence) = (refined.start.clone(), refined.evidence.clone());
+        Ok(Round { pose, start, refinement: Some(refined), evidence, features, probability })
     }
 
     /// The calibrated probability. It was fitted on [`Method::Auto`] with refinement; for other methods, whose
