@@ -56,6 +56,19 @@ impl Registration {
     pub fn from_pose(target_from_source: Rigid) -> Self {
         Self { target_from_source, converged: true, iterations: 1, branches: Vec::new(), skeletons: None }
     }
+
+    /// The answer for the source itself, where this one is for the source as `start` moved it.
+    pub fn after(mut self, start: &Rigid) -> Self {
+        self.target_from_source = self.target_from_source.compose(start);
+        for branch in &mut self.branches {
+            branch.target_from_source = branch.target_from_source.compose(start);
+        }
+        if let Some(skeletons) = &mut self.skeletons {
+            let back = start.inverse();
+            skeletons.source.iter_mut().for_each(|p| *p = back.apply(p));
+        }
+        self
+    }
 }
 
 /// A registration method: two clouds in, one pose out. Same input, same answer.

@@ -102,19 +102,12 @@ impl SrrfRegister {
             let start = found.as_ref().map_or_else(Rigid::identity, |r| r.target_from_source);
             let moved = source.transformed(&start);
             let answer = self.pass(&[(&moved, &target)]).pop().flatten();
-            let mut answer = answer.ok_or_else(|| {
+            let answer = answer.ok_or_else(|| {
                 RegisterError::NoPose(
                     "the network's output is not finite; are the coordinates extreme?".into(),
                 )
             })?;
-            answer.target_from_source = answer.target_from_source.compose(&start);
-            for branch in &mut answer.branches {
-                branch.target_from_source = branch.target_from_source.compose(&start);
-            }
-            if let Some(skeletons) = &mut answer.skeletons {
-                let back = start.inverse();
-                skeletons.source.iter_mut().for_each(|p| *p = back.apply(p));
-            }
+            let mut answer = answer.after(&start);
             answer.iterations = found.as_ref().map_or(1, |r| r.iterations + 1);
             found = Some(answer);
         }

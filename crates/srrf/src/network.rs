@@ -41,16 +41,7 @@ impl Network {
         target: &PointCloud,
         start: &Rigid,
     ) -> Result<Registration, RegisterError> {
-        let mut found = self.register.register(&source.transformed(start), target)?;
-        found.target_from_source = found.target_from_source.compose(start);
-        for branch in &mut found.branches {
-            branch.target_from_source = branch.target_from_source.compose(start);
-        }
-        if let Some(skeletons) = &mut found.skeletons {
-            let back = start.inverse();
-            skeletons.source.iter_mut().for_each(|p| *p = back.apply(p));
-        }
-        Ok(found)
+        Ok(self.register.register(&source.transformed(start), target)?.after(start))
     }
 }
 
