@@ -25,6 +25,7 @@ mod corruption;
 pub mod corruptions;
 pub mod crop;
 mod kind;
+mod mixture;
 mod normalize;
 mod pair;
 pub mod parameters;
@@ -33,10 +34,11 @@ mod variants;
 
 pub use corruption::{CorruptError, Corrupted, Corruption, corruption};
 pub use kind::{CorruptionKind, UnknownCorruption};
+pub use mixture::Mixture;
 pub use normalize::{BoxFrame, box_normalize};
 pub use pair::{
     Bases, Corrupt, InvalidConfig, Label, Normalize, Pair, PairConfig, PairError, PairSynthesizer, PoseDraw,
     Purpose, RotationRange, Sampling, Stream, dcp_test_pose, oracle_pose,
 };
-pub use severity::{Severity, SeverityOutOfRange};
+pub use severity::{Severity, SeverityOutOfRange, Stepped};
 pub use variants::{DensityInc, InvalidVariant, Variants};

@@ -166,6 +166,7 @@ impl Options {
         Ok(Protocol {
             clean: self.corruptions.is_empty() || self.corruptions.iter().any(|c| c == CLEAN),
             corruptions,
+            mixtures: Vec::new(),
             severities,
             shapes: self.shapes,
             seed: self.seed,

@@ -89,6 +89,14 @@ pub enum EvalError {
         /// The system's reason.
         source: io::Error,
     },
+    /// The answers of earlier runs cannot be read, or new ones not be kept.
+    #[error("cannot keep answers in {path:?}: {source}; choose another folder with --cache")]
+    Cache {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
     /// The file for exported pairs cannot be made.
     #[error("cannot write pairs to {path:?}: {source}; choose another file with --export-pairs")]
     ExportPath {

@@ -12,11 +12,13 @@
 //! A new method is one entry in [`METHODS`].
 
 mod arrays;
+mod cache;
 mod chamfer;
 mod cli;
 mod curves;
 pub mod data;
 mod error;
+mod found;
 mod methods;
 mod metrics;
 mod npz_writer;
@@ -31,6 +33,7 @@ mod table;
 mod transforms;
 
 pub use arrays::{Array, ArrayError};
+pub use cache::Cache;
 pub use chamfer::{CleanShape, SkeletonAgreement};
 pub use cli::Options;
 pub use error::EvalError;

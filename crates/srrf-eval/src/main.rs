@@ -62,11 +62,12 @@ fn run(options: &Options) -> Result<(), EvalError> {
     let bar = progress(pairs.as_ref(), "starting");
     let run = Run {
         pairs: pairs.as_ref(),
-        methods,
+        methods: &methods,
         transforms,
         rows: selection.rows,
         batch: options.batch.max(1),
         threads,
+        cache: None,
     };
     let outcome = run.execute(&mut |done, group| {
         bar.inc(done as u64);

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use srrf_baselines::{Fgr, FpfhRansac, Icp, IcpConfig, IcpPlane, IcpRobust, IcpTrimmed, Identity};
 use srrf_cloud::Register;
+use srrf_model::weights::LoadedModel;
 use srrf_model::{SrrfRegister, embedded, weights};
 use srrf_refine::{RefineConfig, Refined};
 
@@ -30,6 +31,9 @@ pub struct Method {
     pub register: Box<dyn Register>,
     /// Where its weights come from; `None` for methods that learn nothing.
     pub weights: Option<String>,
+    /// Settings that are not the method's defaults, in words; empty for the defaults. With name and
+    /// weights they name its answers in a [`Cache`](crate::Cache).
+    pub settings: String,
     /// Whether one call on a batch keeps all cores busy. Batches of other methods are run side by
     /// side.
     pub parallel_inside: bool,
@@ -89,11 +93,18 @@ const fn optional(
 }
 
 fn plain(register: impl Register + 'static) -> Method {
-    Method { register: Box::new(register), weights: None, parallel_inside: false }
+    Method { register: Box::new(register), weights: None, settings: String::new(), parallel_inside: false }
 }
 
 /// The network, with the weights of `--weights` or those in the program.
 fn srrf(context: &MethodContext) -> Result<(SrrfRegister, String), String> {
+    let (loaded, weights) = network(context)?;
+    let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
+    Ok((SrrfRegister::new(loaded, device), weights))
+}
+
+/// The network of `--weights`, or the one in the program, and where it comes from, in words.
+pub(crate) fn network(context: &MethodContext) -> Result<(LoadedModel, String), String> {
     let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
     let (loaded, origin) = match &context.weights {
         Some(path) => match path.to_str().and_then(|name| embedded::load(name, &device)) {
@@ -105,7 +116,7 @@ fn srrf(context: &MethodContext) -> Result<(SrrfRegister, String), String> {
     let loaded = loaded.map_err(|e| e.to_string())?;
     let data = loaded.metadata.get("data").map_or("unknown data", String::as_str);
     let weights = format!("{} ({origin}, sha256 {}), trained on {data}", loaded.name, &loaded.sha256[..16]);
-    Ok((SrrfRegister::new(loaded, device), weights))
+    Ok((loaded, weights))
 }
 
 /// The rows of a run and the methods that fill them.

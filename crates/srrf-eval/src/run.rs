@@ -3,11 +3,13 @@
 use std::time::Instant;
 
 use rayon::prelude::*;
-use srrf_cloud::{Registration, Rigid};
+use srrf_cloud::Rigid;
 use srrf_corrupt::oracle_pose;
 
 use crate::EvalError;
+use crate::cache::{Cache, PairHash};
 use crate::chamfer::{CleanShape, SkeletonAgreement};
+use crate::found::{Found, Poses};
 use crate::methods::{Method, ORACLE};
 use crate::metrics::{PairError, is_finite};
 use crate::pairs::{EvalPair, Group, PairSource};
@@ -17,8 +19,9 @@ use crate::transforms::Transforms;
 pub struct Run<'a> {
     /// The pairs.
     pub pairs: &'a dyn PairSource,
-    /// The methods, set up, each with the names of the rows that it fills.
-    pub methods: Vec<(&'static [&'static str], Method)>,
+    /// The methods, set up, each with the names of the rows that it may fill. Those that fill none of
+    /// [`Run::rows`] are not run.
+    pub methods: &'a [(&'static [&'static str], Method)],
     /// Answers of other tools, a row each.
     pub transforms: Vec<Transforms>,
     /// Names of the rows to keep, in the order of the tables.
@@ -27,6 +30,8 @@ pub struct Run<'a> {
     pub batch: usize,
     /// Worker threads, at least 1.
     pub threads: usize,
+    /// Answers that were computed before, and where new ones are kept.
+    pub cache: Option<&'a Cache>,
 }
 
 /// A method's answer on one pair.
@@ -42,7 +47,7 @@ pub struct Answer {
     pub iterations: Option<usize>,
     /// Whether the method's own stopping rule was met.
     pub converged: Option<bool>,
-    /// Time of the call, divided by the pairs in it; `None` for transforms from a file.
+    /// Time of the call, divided by the pairs in it; `None` for the oracle and transforms from a file.
     pub seconds: Option<f64>,
     /// How well the skeletons agree under the true pose; only in the row of a method that makes
     /// skeletons, not in those of its branches.
@@ -86,8 +91,8 @@ impl Run<'_> {
     /// Answers do not depend on `threads`.
     ///
     /// # Errors
-    /// [`EvalError`] where a pair cannot be made. A method that fails is no error: its failures are
-    /// counted.
+    /// [`EvalError`] where a pair cannot be made, or an answer not be kept. A method that fails is no
+    /// error: its failures are counted.
     pub fn execute(&self, after_chunk: &mut (dyn FnMut(usize, &str) + Send)) -> Result<Outcome, EvalError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build()?;
         pool.install(|| self.execute_here(after_chunk))
@@ -95,6 +100,7 @@ impl Run<'_> {
 
     fn execute_here(&self, after_chunk: &mut (dyn FnMut(usize, &str) + Send)) -> Result<Outcome, EvalError> {
         let groups = self.pairs.groups();
+        let methods = self.running();
         let work: Vec<(usize, usize)> = groups
             .iter()
             .enumerate()
@@ -106,8 +112,13 @@ impl Run<'_> {
                 .par_iter()
                 .map(|&(group, item)| self.pairs.pair(group, item))
                 .collect::<Result<_, _>>()?;
-            let answers: Vec<Vec<Found>> =
-                self.methods.iter().map(|(_, method)| self.register(method, &pairs)).collect();
+            let hash = |pair: &EvalPair| Cache::pair_hash(&pair.pair);
+            let hashes: Vec<PairHash> =
+                self.cache.map_or(Vec::new(), |_| pairs.par_iter().map(hash).collect());
+            let answers: Vec<Vec<Found>> = methods
+                .iter()
+                .map(|(_, method)| self.answers(method, &pairs, &hashes))
+                .collect::<Result<_, _>>()?;
             let scored: Vec<PairRecord> = (0..chunk.len())
                 .into_par_iter()
                 .map(|i| {
@@ -122,17 +133,48 @@ impl Run<'_> {
         Ok(Outcome { groups: groups.to_vec(), rows: self.rows.clone(), records })
     }
 
-    /// One method on the pairs of a chunk: batch after batch where the method spreads over the
-    /// cores itself, side by side where it does not.
-    fn register(&self, method: &Method, pairs: &[EvalPair]) -> Vec<Found> {
-        let call = |batch: &[EvalPair]| -> Vec<Found> {
+    /// The methods that fill a row.
+    fn running(&self) -> Vec<&(&'static [&'static str], Method)> {
+        let fills = |rows: &[&str]| rows.iter().any(|row| self.rows.iter().any(|wanted| wanted == row));
+        self.methods.iter().filter(|(rows, _)| fills(rows)).collect()
+    }
+
+    /// One method on the pairs of a chunk; only those that the cache lacks are computed.
+    fn answers(
+        &self,
+        method: &Method,
+        pairs: &[EvalPair],
+        hashes: &[PairHash],
+    ) -> Result<Vec<Found>, EvalError> {
+        let known: Vec<Option<Found>> = match self.cache {
+            Some(cache) => hashes.iter().map(|hash| cache.get(method, hash)).collect(),
+            None => vec![None; pairs.len()],
+        };
+        let missing: Vec<usize> = (0..pairs.len()).filter(|&i| known[i].is_none()).collect();
+        let unanswered: Vec<&EvalPair> = missing.iter().map(|&i| &pairs[i]).collect();
+        let mut computed = self.register(method, &unanswered).into_iter();
+        if let Some(cache) = self.cache {
+            for (&i, found) in missing.iter().zip(computed.as_slice()) {
+                cache.put(method, &hashes[i], found)?;
+            }
+        }
+        Ok(known.into_iter().filter_map(|found| found.or_else(|| computed.next())).collect())
+    }
+
+    /// One method on pairs: batch after batch where the method spreads over the cores itself, side by
+    /// side where it does not.
+    fn register(&self, method: &Method, pairs: &[&EvalPair]) -> Vec<Found> {
+        let call = |batch: &[&EvalPair]| -> Vec<Found> {
             let clouds: Vec<_> = batch.iter().map(|p| (&p.pair.source, &p.pair.target)).collect();
             let start = Instant::now();
             let answers = method.register.register_batch(&clouds);
             let seconds = start.elapsed().as_secs_f64() / batch.len() as f64;
-            answers.into_iter().map(|a| Found { answer: a.map_err(|e| e.to_string()), seconds }).collect()
+            let truths = batch.iter().map(|p| &p.pair.target_from_source);
+            answers.into_iter().zip(truths).map(|(a, truth)| Found::new(a, truth, seconds)).collect()
         };
-        if method.parallel_inside {
+        if pairs.is_empty() {
+            Vec::new()
+        } else if method.parallel_inside {
             pairs.chunks(self.batch.max(1)).flat_map(call).collect()
         } else {
             pairs.par_chunks(pairs.len().div_ceil(self.threads.max(1))).flat_map_iter(call).collect()
@@ -166,57 +208,46 @@ impl Run<'_> {
     fn answer(&self, row: &str, group: usize, item: usize, pair: &EvalPair, found: &[&Found]) -> Answer {
         let truth = &pair.pair.target_from_source;
         if row == ORACLE {
-            let start = Instant::now();
             let pose = oracle_pose(&pair.pair);
-            let seconds = Some(start.elapsed().as_secs_f64());
             let failure = pose.is_none().then(|| "the correspondences determine no pose".to_owned());
-            return Answer { seconds, ..Answer::new(pose, failure, truth) };
+            return Answer::new(pose, failure, truth);
         }
         if let Some(file) = self.transforms.iter().find(|t| t.name == row) {
             let pose = file.poses[group][item];
             return Answer::new(pose, pose.is_none().then(|| "the file holds no pose".to_owned()), truth);
         }
-        let filled = self.methods.iter().zip(found).find(|((rows, _), _)| rows.contains(&row));
+        let running = self.running();
+        let filled = running.iter().zip(found).find(|((rows, _), _)| rows.contains(&row));
         let Some(((_, method), found)) = filled else {
             return Answer::new(None, Some(format!("no method fills the row {row}")), truth);
         };
-        let seconds = Some(found.seconds);
-        let registration = match &found.answer {
-            Ok(registration) => registration,
+        let seconds = Some(found.seconds.0);
+        let poses = match &found.answer {
+            Ok(poses) => poses,
             Err(failure) => return Answer { seconds, ..Answer::new(None, Some(failure.clone()), truth) },
         };
-        let (pose, failure) = match pose_of_row(registration, method.register.name(), row) {
+        let (pose, failure) = match pose_of_row(poses, method.register.name(), row) {
             Some(pose) if is_finite(&pose) => (Some(pose), None),
             Some(_) => (None, Some("the pose is not finite".to_owned())),
             None => (None, Some("the method gave no pose for this branch".to_owned())),
         };
         Answer {
             seconds,
-            iterations: Some(registration.iterations),
-            converged: Some(registration.converged),
-            skeletons: registration
-                .skeletons
-                .as_ref()
-                .filter(|_| row == method.register.name())
-                .and_then(|s| SkeletonAgreement::new(&s.source, &s.target, truth).ok()),
+            iterations: Some(poses.iterations),
+            converged: Some(poses.converged),
+            skeletons: poses.agreement().filter(|_| row == method.register.name()),
             ..Answer::new(pose, failure, truth)
         }
     }
 }
 
-/// What a method answered, and how long it took.
-struct Found {
-    answer: Result<Registration, String>,
-    seconds: f64,
-}
-
 /// The pose of the row `<method>`, or of the branch in the row `<method>-<branch>`.
-fn pose_of_row(registration: &Registration, method: &str, row: &str) -> Option<Rigid> {
+fn pose_of_row(found: &Poses, method: &str, row: &str) -> Option<Rigid> {
     if row == method {
-        return Some(registration.target_from_source);
+        return Some(found.pose);
     }
     let branch = row.strip_prefix(method)?.strip_prefix('-')?;
-    registration.branches.iter().find(|b| b.name == branch).map(|b| b.target_from_source)
+    found.branches.iter().find(|b| b.name == branch).map(|b| b.pose)
 }
 
 impl Answer {
@@ -228,7 +259,7 @@ impl Answer {
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::{Branch, PointCloud, Register, RegisterError, Skeletons};
+    use srrf_cloud::{Branch, PointCloud, Register, RegisterError, Registration, Skeletons};
     use srrf_corrupt::{CorruptionKind, PairConfig, Severity};
 
     use super::*;
@@ -265,6 +296,7 @@ mod tests {
         let protocol = Protocol {
             clean: true,
             corruptions: vec![CorruptionKind::Shear],
+            mixtures: vec![],
             severities: vec![Severity::ALL[2]],
             shapes: 11,
             seed: 3,
@@ -275,11 +307,22 @@ mod tests {
     }
 
     fn run(pairs: &SynthesizedPairs, batch: usize, threads: usize, parallel_inside: bool) -> Outcome {
-        let moody = Method { register: Box::new(Moody), weights: None, parallel_inside };
+        cached(pairs, batch, threads, parallel_inside, None)
+    }
+
+    fn cached(
+        pairs: &SynthesizedPairs,
+        batch: usize,
+        threads: usize,
+        parallel_inside: bool,
+        cache: Option<&Cache>,
+    ) -> Outcome {
+        let moody =
+            Method { register: Box::new(Moody), weights: None, settings: String::new(), parallel_inside };
         let icp = crate::methods::METHODS.iter().find(|m| m.name == "icp").unwrap();
         let methods = vec![(ROWS, moody), (icp.rows, (icp.build)(&Default::default()).unwrap())];
         let rows = ["icp", ORACLE, "moody-left", "moody-right", "moody"].map(str::to_owned).to_vec();
-        let run = Run { pairs, methods, transforms: vec![], rows, batch, threads };
+        let run = Run { pairs, methods: &methods, transforms: vec![], rows, batch, threads, cache };
         let mut done = 0;
         let outcome = run.execute(&mut |pairs, _| done += pairs).unwrap();
         assert_eq!(done, 22);
@@ -299,6 +342,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_cache_gives_back_every_bit_of_the_answers() {
+        let (pairs, folder) = (pairs(), tempfile::tempdir().unwrap());
+        let fresh = cached(&pairs, 4, 2, false, Some(&Cache::open(folder.path(), "flex").unwrap()));
+        let cache = Cache::open(folder.path(), "flex").unwrap();
+        let again = cached(&pairs, 3, 1, false, Some(&cache));
+        assert_eq!(cache.reused(), 2 * 22, "both methods on every pair");
+        // Answers hold NaN nowhere, so their text says all; times are those of the first run.
+        assert_eq!(format!("{:?}", fresh.records), format!("{:?}", again.records));
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use serde::Serialize;
 use srrf_cloud::source::ShapeSource;
 use srrf_corrupt::{
-    CorruptionKind, Normalize, PairConfig, PairSynthesizer, PoseDraw, Purpose, RotationRange, Sampling,
-    Severity, Stream,
+    CorruptionKind, Mixture, Normalize, PairConfig, PairSynthesizer, PoseDraw, Purpose, RotationRange,
+    Sampling, Severity, Stream,
 };
 
 use crate::EvalError;
@@ -20,7 +20,9 @@ pub struct Protocol {
     pub clean: bool,
     /// Corruptions, in the order of the report.
     pub corruptions: Vec<CorruptionKind>,
-    /// Severities of each corruption.
+    /// Mixtures of corruptions, after them.
+    pub mixtures: Vec<Mixture>,
+    /// Severities of each corruption and mixture.
     pub severities: Vec<Severity>,
     /// Number of shapes; all where the source has fewer.
     pub shapes: usize,
@@ -41,8 +43,27 @@ pub struct SynthesizedPairs {
     shapes: Vec<usize>,
     synthesizer: PairSynthesizer,
     protocol: Protocol,
-    conditions: Vec<Option<(CorruptionKind, Severity)>>,
+    conditions: Vec<Condition>,
     groups: Vec<Group>,
+}
+
+/// What is done to the pairs of a group.
+#[derive(Debug, Clone, Copy)]
+enum Condition {
+    Clean,
+    Corrupted(CorruptionKind, Severity),
+    Mixed(Mixture, Severity),
+}
+
+impl Condition {
+    fn group(self, pairs: usize) -> Group {
+        let (corruption, severity) = match self {
+            Self::Clean => (CLEAN.into(), 0),
+            Self::Corrupted(kind, severity) => (kind.name().into(), severity.get()),
+            Self::Mixed(mixture, severity) => (mixture.to_string(), severity.get()),
+        };
+        Group { corruption, severity, pairs }
+    }
 }
 
 impl SynthesizedPairs {
@@ -55,26 +76,20 @@ impl SynthesizedPairs {
             .map_err(|e| EvalError::Usage(format!("pairs cannot be made so: {e}")))?;
         let count = protocol.shapes.min(source.len());
         let shapes: Vec<usize> = (0..count).map(|i| i * source.len() / count).collect();
-        let clean = protocol.clean.then_some(None);
-        let corrupted = protocol
-            .corruptions
-            .iter()
-            .flat_map(|&kind| protocol.severities.iter().map(move |&severity| Some((kind, severity))));
-        let conditions: Vec<_> = clean.into_iter().chain(corrupted).collect();
+        let clean = protocol.clean.then_some(Condition::Clean);
+        let at = |make: &dyn Fn(Severity) -> Condition| -> Vec<Condition> {
+            protocol.severities.iter().map(|&severity| make(severity)).collect()
+        };
+        let corrupted = protocol.corruptions.iter().flat_map(|&k| at(&|s| Condition::Corrupted(k, s)));
+        let mixed = protocol.mixtures.iter().flat_map(|&m| at(&|s| Condition::Mixed(m, s)));
+        let conditions: Vec<Condition> = clean.into_iter().chain(corrupted).chain(mixed).collect();
         if conditions.is_empty() || shapes.is_empty() {
             return Err(EvalError::Usage(
                 "no pairs to score: at least one shape, and `clean` or a corruption with a severity are needed"
                     .into(),
             ));
         }
-        let groups = conditions
-            .iter()
-            .map(|condition| Group {
-                corruption: condition.map_or(CLEAN.into(), |(kind, _)| kind.name().into()),
-                severity: condition.map_or(0, |(_, severity)| severity.get()),
-                pairs: shapes.len(),
-            })
-            .collect();
+        let groups = conditions.iter().map(|condition| condition.group(shapes.len())).collect();
         Ok(Self { source, shapes, synthesizer, protocol, conditions, groups })
     }
 }
@@ -139,10 +154,22 @@ impl PairSource for SynthesizedPairs {
         let shape = self.shapes[item];
         let stream = Stream { seed: self.protocol.seed, item: shape as u64 };
         let pose = if self.protocol.dcp_poses { PoseDraw::DcpTest(shape as u32) } else { PoseDraw::Seeded };
-        let pair =
-            self.synthesizer.pair(&*self.source, shape, self.conditions[group], pose, stream).map_err(
-                |e| EvalError::Pair { group: self.groups[group].name(), item, problem: e.to_string() },
-            )?;
+        let shapes = &*self.source;
+        let pair = match self.conditions[group] {
+            Condition::Clean => self.synthesizer.pair(shapes, shape, None, pose, stream),
+            Condition::Corrupted(kind, severity) => {
+                self.synthesizer.pair(shapes, shape, Some((kind, severity)), pose, stream)
+            }
+            Condition::Mixed(mixture, severity) => {
+                self.synthesizer.mixed_pair(shapes, shape, (mixture, severity), pose, stream)
+            }
+        };
+        let named = |e: srrf_corrupt::PairError| EvalError::Pair {
+            group: self.groups[group].name(),
+            item,
+            problem: e.to_string(),
+        };
+        let pair = pair.map_err(named)?;
         Ok(EvalPair { pair, clean: self.clean(shape, stream)? })
     }
 }
@@ -158,6 +185,7 @@ mod tests {
         Protocol {
             clean: true,
             corruptions: vec![CorruptionKind::Gaussian, CorruptionKind::Cutout],
+            mixtures: vec![],
             severities: vec![Severity::ALL[0], Severity::ALL[4]],
             shapes: 3,
             seed: 7,
@@ -217,6 +245,17 @@ mod tests {
         let pairs = pairs(Protocol { dcp_poses: true, ..protocol() });
         let pose = pairs.pair(0, 2).unwrap().pair.target_from_source;
         assert_eq!(pose, srrf_corrupt::dcp_test_pose(2));
+    }
+
+    #[test]
+    fn mixtures_come_after_the_corruptions_in_the_same_poses() {
+        let mixture = Mixture::Both(CorruptionKind::Cutout, CorruptionKind::Gaussian);
+        let pairs = pairs(Protocol { mixtures: vec![mixture], ..protocol() });
+        assert_eq!(pairs.groups()[6].name(), "cutout + gaussian_s5");
+        let (mixed, clean) = (pairs.pair(6, 1).unwrap().pair, pairs.pair(0, 1).unwrap().pair);
+        assert_eq!(mixed.target_from_source, clean.target_from_source);
+        assert_eq!((mixed.source.len(), mixed.corruption), (65, None));
+        assert_ne!(mixed.source, clean.source);
     }
 
     #[test]

@@ -169,7 +169,7 @@ fn line(name: &str, quantity: &Quantity, methods: &[&str], values: &[Option<f64>
 
 /// A Markdown table whose columns line up in plain text too. The first line is the header; columns
 /// of numbers are set to the right.
-fn aligned(lines: &[Vec<String>]) -> String {
+pub(crate) fn aligned(lines: &[Vec<String>]) -> String {
     let columns = lines[0].len();
     let width = |c: usize| lines.iter().map(|l| l[c].chars().count()).max().unwrap_or(0).max(3);
     let numeric =

@@ -25,7 +25,7 @@ impl Corruption for Background {
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
         check(points, self.name(), 1)?;
-        let count = share(points, severity.of(&BACKGROUND_DIVISOR));
+        let count = share(points, severity, &BACKGROUND_DIVISOR);
         Ok(Corrupted::extended(points, (0..count).map(|_| in_cube(1.0, rng))))
     }
 }

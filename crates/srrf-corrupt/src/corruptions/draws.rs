@@ -2,6 +2,8 @@
 
 use rand::{Rng, RngExt, seq::index};
 
+use crate::Severity;
+
 /// Uniform in `[-half_width, half_width)` on each coordinate.
 pub(super) fn in_cube<R: Rng>(half_width: f64, rng: &mut R) -> [f64; 3] {
     std::array::from_fn(|_| (2.0 * rng.random::<f64>() - 1.0) * half_width)
@@ -19,9 +21,13 @@ pub(super) fn distinct<R: Rng>(length: usize, amount: usize, rng: &mut R) -> Vec
     chosen
 }
 
-/// One for each `divisor` points of `points`, and at least one.
-pub(super) fn share(points: &[[f64; 3]], divisor: usize) -> usize {
-    (points.len() / divisor).max(1)
+/// One for each `d` points of `points`, and at least one, where `d` is the severity's divisor.
+pub(super) fn share(points: &[[f64; 3]], severity: Severity, divisors: &[usize; 5]) -> usize {
+    let count = match severity.beyond() {
+        0 => points.len() / severity.of(divisors),
+        _ => (points.len() as f64 * severity.share_of(divisors)) as usize,
+    };
+    count.max(1)
 }
 
 /// `a + b`.

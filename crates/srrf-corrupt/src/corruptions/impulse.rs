@@ -28,7 +28,7 @@ impl Corruption for Impulse {
     ) -> Result<Corrupted, CorruptError> {
         check(points, self.name(), 1)?;
         let mut moved = points.to_vec();
-        for i in distinct(points.len(), share(points, severity.of(&IMPULSE_DIVISOR)), rng) {
+        for i in distinct(points.len(), share(points, severity, &IMPULSE_DIVISOR), rng) {
             moved[i] = add(&points[i], &std::array::from_fn(|_| self.linf * sign(rng)));
         }
         Ok(Corrupted::moved(moved))

@@ -27,7 +27,7 @@ impl Corruption for Upsampling {
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
         check(points, self.name(), 1)?;
-        let copied = distinct(points.len(), share(points, severity.of(&UPSAMPLING_DIVISOR)), rng);
+        let copied = distinct(points.len(), share(points, severity, &UPSAMPLING_DIVISOR), rng);
         Ok(Corrupted::extended(points, copied.into_iter().map(|i| add(&points[i], &in_cube(self.linf, rng)))))
     }
 }

@@ -7,7 +7,9 @@ use srrf_cloud::{CloudError, PointCloud, Rigid};
 
 use super::pose::draw;
 use super::{Corrupt, InvalidConfig, Normalize, PairConfig, PoseDraw, Purpose, Sampling, Stream};
-use crate::{CorruptError, Corrupted, CorruptionKind, DensityInc, Severity, box_normalize};
+use crate::{
+    CorruptError, Corrupted, Corruption, CorruptionKind, DensityInc, Mixture, Severity, box_normalize,
+};
 
 /// Two clouds of one shape, and the pose between them.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +26,7 @@ pub struct Pair {
     pub source_origin: Option<Vec<Option<u32>>>,
     /// The same for the target. Points with equal entries correspond.
     pub target_origin: Option<Vec<Option<u32>>>,
-    /// What was done to the clouds; `None` if they are clean.
+    /// What was done to the clouds; `None` if they are clean, or corrupted by a [`Mixture`].
     pub corruption: Option<(CorruptionKind, Severity)>,
     /// Name of the shape.
     pub id: String,
@@ -81,6 +83,15 @@ pub enum PairError {
     },
 }
 
+/// What hits a cloud.
+#[derive(Clone, Copy)]
+struct Hit<'a> {
+    corruption: &'a dyn Corruption,
+    severity: Severity,
+    /// Whether box normalisation, if the config asks for it, follows.
+    boxed: bool,
+}
+
 /// Makes registration pairs by one [`PairConfig`]. Cheap; share it between threads.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairSynthesizer {
@@ -121,6 +132,40 @@ impl PairSynthesizer {
         let thinned = self.config.variants.density_inc == DensityInc::ModelNet40C
             && matches!(corruption, Some((CorruptionKind::DensityInc, _)));
         let count = if thinned { 2 * self.config.points } else { self.config.points };
+        self.sampled(shapes, index, count, stream, |bases, label| {
+            self.pair_from_bases(bases, label, corruption, pose, stream)
+        })
+    }
+
+    /// As [`PairSynthesizer::pair`], with a mixture of corruptions. Box normalisation leaves mixtures
+    /// alone.
+    ///
+    /// # Errors
+    /// [`PairError`] when the shape cannot be read or corrupted.
+    pub fn mixed_pair(
+        &self,
+        shapes: &dyn ShapeSource,
+        index: usize,
+        (mixture, severity): (Mixture, Severity),
+        pose: PoseDraw,
+        stream: Stream,
+    ) -> Result<Pair, PairError> {
+        let corruption = mixture.corruption(&self.config.variants);
+        let hit = Hit { corruption: &*corruption, severity, boxed: false };
+        self.sampled(shapes, index, self.config.points, stream, |bases, label| {
+            self.make(bases, label, Some(hit), pose, stream)
+        })
+    }
+
+    /// Draws `count` base points of shape `index` for `make`.
+    fn sampled(
+        &self,
+        shapes: &dyn ShapeSource,
+        index: usize,
+        count: usize,
+        stream: Stream,
+        make: impl FnOnce(Bases<'_>, Label) -> Result<Pair, PairError>,
+    ) -> Result<Pair, PairError> {
         let label = Label {
             id: shapes.id(index),
             class: shapes.class(index).to_owned(),
@@ -128,13 +173,10 @@ impl PairSynthesizer {
         };
         let mut rng = stream.rng(Purpose::Base);
         match self.config.sampling {
-            Sampling::Shared => {
-                let base = shapes.sample(index, count, &mut rng)?;
-                self.pair_from_bases(Bases::Shared(&base), label, corruption, pose, stream)
-            }
+            Sampling::Shared => make(Bases::Shared(&shapes.sample(index, count, &mut rng)?), label),
             Sampling::Independent => {
                 let (source, target) = shapes.sample_two(index, count, &mut rng)?;
-                self.pair_from_bases(Bases::Independent(&source, &target), label, corruption, pose, stream)
+                make(Bases::Independent(&source, &target), label)
             }
         }
     }
@@ -148,6 +190,25 @@ impl PairSynthesizer {
         bases: Bases<'_>,
         label: Label,
         corruption: Option<(CorruptionKind, Severity)>,
+        pose: PoseDraw,
+        stream: Stream,
+    ) -> Result<Pair, PairError> {
+        let built = corruption
+            .map(|(kind, severity)| (crate::corruption(kind, &self.config.variants), kind, severity));
+        let hit = built.as_ref().map(|(corruption, kind, severity)| Hit {
+            corruption: &**corruption,
+            severity: *severity,
+            boxed: kind.is_box_normalized(),
+        });
+        Ok(Pair { corruption, ..self.make(bases, label, hit, pose, stream)? })
+    }
+
+    /// Corrupts, resamples, poses and shuffles.
+    fn make(
+        &self,
+        bases: Bases<'_>,
+        label: Label,
+        corruption: Option<Hit<'_>>,
         pose: PoseDraw,
         stream: Stream,
     ) -> Result<Pair, PairError> {
@@ -167,7 +228,7 @@ impl PairSynthesizer {
             let cloud = self
                 .corrupted(base, hit, &mut rng)
                 .map_err(|source| PairError::Corrupt { id: label.id.clone(), source })?;
-            let boxed = hit.is_some_and(|(kind, _)| kind.is_box_normalized());
+            let boxed = hit.is_some_and(|hit| hit.boxed);
             let mut cloud = resample(cloud, config.points, &mut stream.rng(resampling));
             cloud.points.iter_mut().for_each(|p| *p = pose.apply(p));
             if boxed && config.normalize == Normalize::AfterPose {
@@ -198,7 +259,7 @@ impl PairSynthesizer {
             target_from_source,
             source_origin,
             target_origin,
-            corruption,
+            corruption: None,
             id,
             class,
             symmetric,
@@ -209,14 +270,14 @@ impl PairSynthesizer {
     fn corrupted(
         &self,
         base: &PointCloud,
-        corruption: Option<(CorruptionKind, Severity)>,
+        hit: Option<Hit<'_>>,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        let Some((kind, severity)) = corruption else {
+        let Some(Hit { corruption, severity, boxed }) = hit else {
             return Ok(Corrupted::moved(base.points().to_vec()));
         };
-        let mut cloud = crate::corruption(kind, &self.config.variants).apply(base.points(), severity, rng)?;
-        if kind.is_box_normalized() && self.config.normalize == Normalize::Canonical {
+        let mut cloud = corruption.apply(base.points(), severity, rng)?;
+        if boxed && self.config.normalize == Normalize::Canonical {
             box_normalize(&mut cloud.points);
         }
         Ok(cloud)

@@ -8,6 +8,7 @@ fn synthesized() -> SynthesizedPairs {
     let protocol = Protocol {
         clean: true,
         corruptions: vec![CorruptionKind::Background],
+        mixtures: vec![],
         severities: vec![Severity::ALL[1]],
         shapes: 5,
         seed: 3,
