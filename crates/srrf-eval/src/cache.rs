@@ -48,6 +48,7 @@ struct Lines {
 }
 
 /// The part of a key that belongs to a pair.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct PairHash([u8; 32]);
 
 impl Cache {

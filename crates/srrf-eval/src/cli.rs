@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::Parser;
+use clap::{Parser, Subcommand};
 use serde::de::DeserializeOwned;
 use srrf_corrupt::{CorruptionKind, PairConfig, RotationRange, Severity, Variants};
 
 use crate::EvalError;
+use crate::TablesOptions;
 use crate::synthesized::{CLEAN, Protocol};
 
 /// Shapes scored when `--shapes` is not given.
@@ -16,8 +17,12 @@ const DEFAULT_SHAPES: usize = 20;
 ///
 /// Without --data (and without $SRRF_DATA) it uses shapes that it makes itself.
 #[derive(Debug, Clone, Parser)]
-#[command(name = "srrf-eval", version, after_help = EXAMPLES)]
+#[command(name = "srrf-eval", version, after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
 pub struct Options {
+    /// Something else than the plain tables.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+
     /// ModelNet40, or a folder of shapes; its test split is used [default: $SRRF_DATA, or built-in
     /// shapes]
     #[arg(long, value_name = "PATH")]
@@ -114,6 +119,13 @@ pub struct Options {
     pub variants: String,
 }
 
+/// What the program does beside scoring one protocol.
+#[derive(Debug, Clone, Subcommand)]
+pub enum Command {
+    /// All tables and figures of the paper and of our ablations, and one page to look at them
+    Tables(Box<TablesOptions>),
+}
+
 const PAIR_OPTIONS: [&str; 12] = [
     "data",
     "shapes",
@@ -134,6 +146,7 @@ Examples:
   srrf-eval                                     built-in shapes, all corruptions
   srrf-eval --data modelnet40_ply_hdf5_2048     the test split of ModelNet40
   srrf-eval --corruptions clean,cutout --severities 3,5 --methods icp,oracle
+  srrf-eval tables --data PATH --shapes 100     the paper's tables and figures, and a page of them
   srrf-eval --export-pairs pairs.npz            then run another tool on them, and
   srrf-eval --pairs pairs.npz --transforms tool.npz
 

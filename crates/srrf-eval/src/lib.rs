@@ -7,7 +7,8 @@
 //! 2. [`Run`] gives them to the methods of the registry ([`METHODS`]) and keeps every answer;
 //! 3. every answer becomes a [`PairError`], and many become [`Scores`];
 //! 4. [`Summary`] has them per corruption, severity and method;
-//! 5. [`report`] writes tables, curves and `results.json`.
+//! 5. [`report`] writes tables, curves and `results.json`; [`tables`] runs many experiments and makes the
+//!    whole report of the paper's tables and figures.
 //!
 //! A new method is one entry in [`METHODS`].
 
@@ -30,12 +31,13 @@ mod run;
 mod summary;
 mod synthesized;
 mod table;
+pub mod tables;
 mod transforms;
 
 pub use arrays::{Array, ArrayError};
 pub use cache::Cache;
 pub use chamfer::{CleanShape, SkeletonAgreement};
-pub use cli::Options;
+pub use cli::{Command, Options};
 pub use error::EvalError;
 pub use methods::{METHODS, Method, MethodContext, MethodEntry, ORACLE, Selection, all_rows, select};
 pub use metrics::{MetricError, PairError, RECALL_ROTATION_DEG, RECALL_TRANSLATION, Scores};
@@ -46,4 +48,5 @@ pub use report::Meta;
 pub use run::{Answer, Outcome, PairRecord, Run};
 pub use summary::{SeverityKey, Summary, SummaryRow};
 pub use synthesized::{CLEAN, Protocol, SynthesizedPairs};
+pub use tables::TablesOptions;
 pub use transforms::Transforms;

@@ -7,14 +7,20 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
+use srrf_eval::tables::{self, Progress};
 use srrf_eval::{
-    EvalError, Meta, MethodContext, Options, PairFile, PairSource, Run, Summary, SynthesizedPairs,
-    Transforms, data, report,
+    Command, EvalError, Meta, MethodContext, Options, PairFile, PairSource, Run, Summary, SynthesizedPairs,
+    TablesOptions, Transforms, data, report,
 };
 
 fn main() -> ExitCode {
     srrf_model::keep_freed_memory();
-    match run(&Options::parse()) {
+    let options = Options::parse();
+    let done = match &options.command {
+        Some(Command::Tables(tables)) => make_tables(tables),
+        None => run(&options),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let _ = writeln!(io::stderr(), "error: {error}");
@@ -106,6 +112,27 @@ fn run(options: &Options) -> Result<(), EvalError> {
     Ok(())
 }
 
+/// The report of `srrf-eval tables`.
+fn make_tables(options: &TablesOptions) -> Result<(), EvalError> {
+    let bar = ProgressBar::new(0).with_style(bar_style());
+    let written = tables::make(options, &mut |progress| match progress {
+        Progress::Line(line) => say(line),
+        Progress::Start(title, pairs) => {
+            bar.finish_and_clear();
+            say(&format!("{title}: {pairs} pairs"));
+            bar.reset();
+            bar.set_length(pairs as u64);
+        }
+        Progress::Done(pairs, group) => {
+            bar.inc(pairs as u64);
+            bar.set_message(group.to_owned());
+        }
+    })?;
+    bar.finish_and_clear();
+    say(&format!("written to {}: {}", options.out.display(), written.join(", ")));
+    Ok(())
+}
+
 /// The pairs of a file, or pairs made from shapes.
 fn open_pairs(options: &Options) -> Result<Box<dyn PairSource>, EvalError> {
     if let Some(path) = &options.pairs {
@@ -119,9 +146,12 @@ fn open_pairs(options: &Options) -> Result<Box<dyn PairSource>, EvalError> {
 /// A bar on the terminal, if there is one.
 fn progress(pairs: &dyn PairSource, message: &'static str) -> ProgressBar {
     let total = pairs.groups().iter().map(|g| g.pairs as u64).sum();
+    ProgressBar::new(total).with_style(bar_style()).with_message(message)
+}
+
+fn bar_style() -> ProgressStyle {
     let template = "{msg:24} {wide_bar} {pos}/{len} pairs, {eta} left";
-    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(total).with_style(style).with_message(message)
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 /// A line on standard output; a closed pipe is no reason to stop before the report is written.

@@ -146,19 +146,23 @@ impl Run<'_> {
         pairs: &[EvalPair],
         hashes: &[PairHash],
     ) -> Result<Vec<Found>, EvalError> {
-        let known: Vec<Option<Found>> = match self.cache {
-            Some(cache) => hashes.iter().map(|hash| cache.get(method, hash)).collect(),
-            None => vec![None; pairs.len()],
+        let Some(cache) = self.cache else {
+            return Ok(self.register(method, &pairs.iter().collect::<Vec<_>>()));
         };
-        let missing: Vec<usize> = (0..pairs.len()).filter(|&i| known[i].is_none()).collect();
+        let mut known: Vec<Option<Found>> = hashes.iter().map(|hash| cache.get(method, hash)).collect();
+        // Two groups may hold the same clouds; they are computed once.
+        let missing: Vec<usize> =
+            (0..pairs.len()).filter(|&i| known[i].is_none() && !hashes[..i].contains(&hashes[i])).collect();
         let unanswered: Vec<&EvalPair> = missing.iter().map(|&i| &pairs[i]).collect();
-        let mut computed = self.register(method, &unanswered).into_iter();
-        if let Some(cache) = self.cache {
-            for (&i, found) in missing.iter().zip(computed.as_slice()) {
-                cache.put(method, &hashes[i], found)?;
-            }
+        for (i, found) in missing.into_iter().zip(self.register(method, &unanswered)) {
+            cache.put(method, &hashes[i], &found)?;
+            known[i] = Some(found);
         }
-        Ok(known.into_iter().filter_map(|found| found.or_else(|| computed.next())).collect())
+        let answer = |i: usize| {
+            let first = hashes.iter().position(|hash| *hash == hashes[i]).unwrap_or(i);
+            known[i].clone().or_else(|| known[first].clone())
+        };
+        Ok((0..pairs.len()).filter_map(answer).collect())
     }
 
     /// One method on pairs: batch after batch where the method spreads over the cores itself, side by

@@ -1,0 +1,232 @@
+//! `srrf-eval tables`: the paper's tables and figures, our ablations, and one page to look at it all.
+//!
+//! 1. [`cast`] sets up the methods, [`plan`] says which pairs each experiment scores;
+//! 2. every experiment goes through [`Run`] and the [`Cache`], the same path as the plain command;
+//! 3. [`sheets`], [`figures`] and [`chosen`] make tables, pictures and views from the summaries;
+//! 4. [`report`] joins them into a [`document::Document`], and [`write`] puts it into the folder.
+
+mod cast;
+mod chosen;
+mod document;
+mod figures;
+mod losses;
+mod options;
+mod page;
+mod paper;
+mod plan;
+mod report;
+mod sampling;
+mod sheet;
+mod sheets;
+mod thresholds;
+mod write;
+
+use std::collections::BTreeMap;
+
+use srrf_corrupt::Severity;
+
+pub use options::TablesOptions;
+
+use crate::cache::Cache;
+use crate::methods::{Method, MethodContext};
+use crate::pairs::PairSource;
+use crate::run::{Outcome, Run};
+use crate::summary::Summary;
+use crate::synthesized::{Protocol, SynthesizedPairs};
+use crate::{EvalError, data};
+use cast::{Cast, model_or};
+use sampling::SampledPairs;
+
+/// Built-in shapes that are scored without data.
+const BUILT_IN_SHAPES: usize = 20;
+
+/// What [`make`] says while it works.
+pub enum Progress<'a> {
+    /// A line for the reader.
+    Line(&'a str),
+    /// An experiment begins: its title, its pairs.
+    Start(&'a str, usize),
+    /// So many pairs are done; the last was of this group.
+    Done(usize, &'a str),
+}
+
+/// Where progress goes.
+type Listener<'a> = &'a mut (dyn FnMut(Progress<'_>) + Send);
+
+/// A scored experiment.
+struct Measured {
+    outcome: Outcome,
+    summary: Summary,
+    data: String,
+}
+
+/// Everything that was measured, by part of the report.
+struct Evidence {
+    parts: BTreeMap<&'static str, Measured>,
+    cast: Cast,
+    /// Parts that were wanted and could not be made, and why.
+    missing: Vec<(String, String)>,
+    shapes: usize,
+}
+
+/// Makes the report and gives the names of the files written.
+///
+/// # Errors
+/// [`EvalError`] where data, weights or folders cannot be used.
+pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, EvalError> {
+    let context = MethodContext { weights: options.weights.clone(), device: options.device.clone() };
+    let cast = Cast::new(&options.methods, &context)?;
+    crate::report::prepare(&options.out)?;
+    let cache = Cache::open(&options.cache_folder(), &options.device)?;
+    for (name, reason) in &cast.left_out {
+        say(Progress::Line(&format!("left out: {name}: {reason}")));
+    }
+    let shapes = match options.shapes {
+        Some(0) => return Err(EvalError::Usage("--shapes 0: at least one shape is needed".into())),
+        Some(shapes) => shapes,
+        None => data::open(options.data.as_deref(), BUILT_IN_SHAPES)?.len(),
+    };
+    let stage = Stage { options, cache: &cache, shapes };
+    let mut parts = BTreeMap::new();
+    for experiment in plan::experiments(options, shapes, &cast) {
+        let pairs = stage.pairs(experiment.protocol)?;
+        let measured = stage.score(experiment.title, &pairs, &cast.methods, experiment.rows, say)?;
+        parts.insert(experiment.key, measured);
+    }
+    let mut evidence = Evidence { parts, cast, missing: Vec::new(), shapes };
+    stage.other_weights(&mut evidence, say)?;
+    stage.thresholds(&mut evidence, &context, say)?;
+    stage.samples(&mut evidence, say)?;
+    say(Progress::Line(&format!("{} answers were taken from the cache", cache.reused())));
+    let document = report::document(options, &stage, &evidence, &context)?;
+    write::all(options, &document, &evidence)
+}
+
+/// What all experiments share.
+struct Stage<'a> {
+    options: &'a TablesOptions,
+    cache: &'a Cache,
+    shapes: usize,
+}
+
+impl Stage<'_> {
+    fn pairs(&self, protocol: Protocol) -> Result<SynthesizedPairs, EvalError> {
+        let source = data::open(self.options.data.as_deref(), protocol.shapes)?;
+        SynthesizedPairs::new(source, protocol)
+    }
+
+    fn score(
+        &self,
+        title: &str,
+        pairs: &dyn PairSource,
+        methods: &[(&'static [&'static str], Method)],
+        rows: Vec<String>,
+        say: Listener<'_>,
+    ) -> Result<Measured, EvalError> {
+        say(Progress::Start(title, pairs.groups().iter().map(|g| g.pairs).sum()));
+        let threads = match self.options.threads {
+            Some(0) => return Err(EvalError::Usage("--threads 0: at least one thread is needed".into())),
+            Some(threads) => threads,
+            None => std::thread::available_parallelism().map_or(1, usize::from),
+        };
+        let batch = self.options.batch.max(1);
+        let run =
+            Run { pairs, methods, transforms: Vec::new(), rows, batch, threads, cache: Some(self.cache) };
+        let outcome = run.execute(&mut |done, group| say(Progress::Done(done, group)))?;
+        Ok(Measured { summary: Summary::of(&outcome)?, outcome, data: pairs.description() })
+    }
+
+    /// The network with the weights of the other tables: trained clean, trained without the loss.
+    fn other_weights(&self, evidence: &mut Evidence, say: Listener<'_>) -> Result<(), EvalError> {
+        let options = self.options;
+        let wanted = [
+            (
+                "clean-trained",
+                "models trained clean",
+                &options.clean_weights,
+                "srrf-clean",
+                "--clean-weights",
+            ),
+            (
+                "table5",
+                "skeletons without the loss",
+                &options.no_ddl_weights,
+                "srrf-no-ddl",
+                "--no-ddl-weights",
+            ),
+        ];
+        for (key, title, option, name, switch) in wanted {
+            if !options.wants(key) {
+                continue;
+            }
+            let Some(weights) = model_or(option.as_deref(), name) else {
+                let reason = format!("no weights `{name}` in the program; give a file with {switch}");
+                evidence.missing.push((title.to_owned(), reason));
+                continue;
+            };
+            let context = MethodContext { weights: Some(weights), device: options.device.clone() };
+            let rows = ["srrf-dense", "srrf-skeleton", "srrf"].map(str::to_owned);
+            let cast = Cast::new(&rows, &context)?;
+            let mut protocol = plan::main_protocol(options, self.shapes);
+            if key == "table5" {
+                protocol.severities = vec![Severity::ALL[2]];
+            }
+            let measured =
+                self.score(title, &self.pairs(protocol)?, &cast.methods, cast.rows.clone(), say)?;
+            evidence.parts.insert(key, measured);
+            evidence.cast.weights.extend(cast.weights.into_values().map(|w| (title.to_owned(), w)));
+        }
+        Ok(())
+    }
+
+    /// The variants of the integration.
+    fn thresholds(
+        &self,
+        evidence: &mut Evidence,
+        context: &MethodContext,
+        say: Listener<'_>,
+    ) -> Result<(), EvalError> {
+        if !self.options.wants("thresholds") || evidence.cast.method("srrf").is_none() {
+            return Ok(());
+        }
+        let methods = thresholds::methods(context)?;
+        let protocol = Protocol {
+            clean: false,
+            corruptions: thresholds::CORRUPTIONS.to_vec(),
+            severities: vec![plan::MIDDLE],
+            ..plan::main_protocol(self.options, self.shapes)
+        };
+        let rows = methods.iter().flat_map(|(rows, _)| rows.iter().map(|r| (*r).to_owned())).collect();
+        let measured = self.score("inlier thresholds", &self.pairs(protocol)?, &methods, rows, say)?;
+        evidence.parts.insert("thresholds", measured);
+        Ok(())
+    }
+
+    /// Table 4.
+    fn samples(&self, evidence: &mut Evidence, say: Listener<'_>) -> Result<(), EvalError> {
+        if !self.options.wants("table4") {
+            return Ok(());
+        }
+        let rows = evidence.cast.only(&report::SAMPLED_ROWS);
+        let Some(network) = evidence.cast.method("srrf").filter(|_| !rows.is_empty()) else { return Ok(()) };
+        if !rows.iter().any(|r| r == "dcp") {
+            let reason = "DCP has no weights here; other methods stand in".to_owned();
+            evidence.missing.push(("DCP in table 4".to_owned(), reason));
+        }
+        let pairs = self.sampled(&*network.register)?;
+        let measured = self.score("samples of clean pairs", &pairs, &evidence.cast.methods, rows, say)?;
+        evidence.parts.insert("table4", measured);
+        Ok(())
+    }
+
+    /// The pairs of table 4.
+    fn sampled<'a>(&self, skeletons: &'a dyn srrf_cloud::Register) -> Result<SampledPairs<'a>, EvalError> {
+        let main = plan::main_protocol(self.options, self.shapes);
+        let clean = self.pairs(Protocol { corruptions: Vec::new(), severities: Vec::new(), ..main })?;
+        // As many points as the skeletons of the network have, so that only the choice differs.
+        let first = clean.pair(0, 0)?.pair;
+        let found = skeletons.register(&first.source, &first.target).ok();
+        let count = found.and_then(|f| f.skeletons).map_or(64, |s| s.source.len());
+        Ok(SampledPairs::new(clean, skeletons, count, self.options.seed))
+    }
+}

@@ -1,0 +1,106 @@
+//! The options of `srrf-eval tables`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+/// Makes all tables and figures of the report: the paper's tables 1 to 5 with its own numbers beside
+/// ours, the ablations that need no training, severity curves, and one page to look at it all.
+///
+/// Answers are kept as they come: the same command goes on where a kill stopped it, and a second run
+/// computes nothing.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = EXAMPLES)]
+pub struct TablesOptions {
+    /// ModelNet40, or a folder of shapes; its test split is used [default: $SRRF_DATA, or built-in
+    /// shapes]
+    #[arg(long, value_name = "PATH")]
+    pub data: Option<PathBuf>,
+
+    /// Number of shapes, spread evenly over the data [default: all, or 20 built-in shapes]. All of
+    /// ModelNet40's test split takes days on two cores
+    #[arg(long, value_name = "N")]
+    pub shapes: Option<usize>,
+
+    /// Rows of the tables [default: the paper's methods, and ours]. Those without weights are left out,
+    /// and the report says so
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub methods: Vec<String>,
+
+    /// Parts to make [default: all]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PARTS)]
+    pub parts: Vec<String>,
+
+    /// Trained weights: a file, or the name of a model in the program [default: srrf-small]
+    #[arg(long, value_name = "PATH")]
+    pub weights: Option<PathBuf>,
+
+    /// Weights that were trained on clean pairs only, for the tables of models trained clean [default:
+    /// srrf-clean, if the program has it]
+    #[arg(long, value_name = "PATH")]
+    pub clean_weights: Option<PathBuf>,
+
+    /// Weights that were trained without the distribution distance loss, for table 5 [default:
+    /// srrf-no-ddl, if the program has it]
+    #[arg(long, value_name = "PATH")]
+    pub no_ddl_weights: Option<PathBuf>,
+
+    /// Seed of the pairs: corruptions, poses and order of the points
+    #[arg(long, value_name = "S", default_value_t = 1)]
+    pub seed: u64,
+
+    /// Points of each cloud
+    #[arg(long, value_name = "N", default_value_t = 1024)]
+    pub points: usize,
+
+    /// Where tensors live
+    #[arg(long, value_name = "NAME", default_value = "flex")]
+    pub device: String,
+
+    /// Worker threads [default: all cores]. Results do not depend on it
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+
+    /// Pairs in one call of a method
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    pub batch: usize,
+
+    /// Folder for the report
+    #[arg(long, value_name = "DIR", default_value = "report")]
+    pub out: PathBuf,
+
+    /// Folder for the answers that are kept [default: `cache` in the report's folder]
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<PathBuf>,
+}
+
+/// Names of the parts of the report.
+pub(crate) const PARTS: [&str; 9] = [
+    "main",
+    "clean-trained",
+    "table4",
+    "table5",
+    "one-sided",
+    "independent",
+    "beyond",
+    "mixtures",
+    "thresholds",
+];
+
+const EXAMPLES: &str = "\
+Examples:
+  srrf-eval tables                                    built-in shapes, a first look
+  srrf-eval tables --data PATH --shapes 100           100 shapes of the test split
+  srrf-eval tables --data PATH --methods icp,oracle,srrf --parts main,beyond";
+
+impl TablesOptions {
+    /// Whether a part is to be made.
+    pub(crate) fn wants(&self, part: &str) -> bool {
+        self.parts.is_empty() || self.parts.iter().any(|p| p == part)
+    }
+
+    /// The folder of the answers.
+    pub(crate) fn cache_folder(&self) -> PathBuf {
+        self.cache.clone().unwrap_or_else(|| self.out.join("cache"))
+    }
+}

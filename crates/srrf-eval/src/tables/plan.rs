@@ -1,0 +1,114 @@
+//! The experiments of a report: which pairs, and which rows.
+
+use srrf_corrupt::{Corrupt, CorruptionKind, Mixture, PairConfig, Sampling, Severity};
+
+use super::cast::Cast;
+use super::options::TablesOptions;
+use crate::methods::ORACLE;
+use crate::synthesized::Protocol;
+
+/// The severity of the ablations.
+pub(crate) const MIDDLE: Severity = Severity::ALL[2];
+
+/// Rows of the ablations that compare protocols.
+const ABLATION_ROWS: [&str; 7] =
+    ["icp", "fpfh-ransac", ORACLE, "srrf-dense", "srrf-skeleton", "srrf", "srrf+refine"];
+
+/// Mixtures that are scored: two corruptions of different families at once, and one of each family in
+/// half of the cloud.
+pub(crate) const MIXTURES: [Mixture; 10] = {
+    use CorruptionKind::{Background, Cutout, DensityDec, DistortionRbf, Gaussian, Impulse, Shear};
+    [
+        Mixture::Both(Cutout, Gaussian),
+        Mixture::Both(DensityDec, Background),
+        Mixture::Both(Cutout, Background),
+        Mixture::Both(DistortionRbf, Gaussian),
+        Mixture::Both(Shear, Cutout),
+        Mixture::Local(Gaussian),
+        Mixture::Local(Background),
+        Mixture::Local(Impulse),
+        Mixture::Local(DensityDec),
+        Mixture::Local(Cutout),
+    ]
+};
+
+/// Pairs and rows of one experiment.
+pub(crate) struct Experiment {
+    /// Its part of the report.
+    pub key: &'static str,
+    /// What is shown while it runs.
+    pub title: &'static str,
+    /// Its pairs.
+    pub protocol: Protocol,
+    /// Its rows.
+    pub rows: Vec<String>,
+}
+
+/// The protocol of the main tables.
+pub(crate) fn main_protocol(options: &TablesOptions, shapes: usize) -> Protocol {
+    Protocol {
+        clean: true,
+        corruptions: CorruptionKind::ALL.to_vec(),
+        mixtures: Vec::new(),
+        severities: Severity::ALL.to_vec(),
+        shapes,
+        seed: options.seed,
+        pair: PairConfig { points: options.points, ..PairConfig::default() },
+        dcp_poses: false,
+    }
+}
+
+/// The main experiment and the ablations of protocols that are wanted.
+pub(crate) fn experiments(options: &TablesOptions, shapes: usize, cast: &Cast) -> Vec<Experiment> {
+    let main = main_protocol(options, shapes);
+    let middle = Protocol { severities: vec![MIDDLE], ..main.clone() };
+    // Every point is copied at severity 5 already.
+    let extendable = CorruptionKind::ALL.into_iter().filter(|k| *k != CorruptionKind::Upsampling);
+    let rows = || cast.only(&ABLATION_ROWS);
+    let without_oracle = rows().into_iter().filter(|row| row != ORACLE).collect();
+    let all = [
+        Experiment { key: "main", title: "all corruptions", protocol: main.clone(), rows: cast.rows.clone() },
+        Experiment {
+            key: "one-sided",
+            title: "one cloud corrupted",
+            protocol: Protocol {
+                clean: false,
+                pair: PairConfig { corrupt: Corrupt::Target, ..main.pair },
+                ..middle.clone()
+            },
+            rows: rows(),
+        },
+        Experiment {
+            key: "independent",
+            title: "independent sampling",
+            protocol: Protocol {
+                pair: PairConfig { sampling: Sampling::Independent, ..main.pair },
+                ..middle.clone()
+            },
+            rows: without_oracle,
+        },
+        Experiment {
+            key: "beyond",
+            title: "severities 6 and 7",
+            protocol: Protocol {
+                clean: false,
+                corruptions: extendable.collect(),
+                severities: Severity::BEYOND.to_vec(),
+                ..main
+            },
+            rows: rows(),
+        },
+        Experiment {
+            key: "mixtures",
+            title: "mixtures of corruptions",
+            protocol: Protocol {
+                clean: false,
+                corruptions: Vec::new(),
+                mixtures: MIXTURES.to_vec(),
+                ..middle
+            },
+            rows: rows(),
+        },
+    ];
+    all.into_iter().filter(|e| options.wants(e.key) && !e.rows.is_empty()).collect()
+}

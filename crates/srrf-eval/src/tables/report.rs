@@ -1,0 +1,283 @@
+//! The report, put together from what was measured.
+
+use srrf_cloud::{PointCloud, Register};
+use srrf_corrupt::Pair;
+
+use super::document::{Document, Section};
+use super::options::TablesOptions;
+use super::sheets::{self, Column};
+use super::{Evidence, Measured, Stage, chosen, figures, losses, plan, thresholds};
+use crate::EvalError;
+use crate::methods::MethodContext;
+use crate::pairs::PairSource;
+use crate::summary::SeverityKey;
+use crate::synthesized::SynthesizedPairs;
+
+/// Rows of table 4: DCP, or what stands in for it.
+pub(super) const SAMPLED_ROWS: [&str; 4] = ["icp", "dcp", "srrf-dense", "srrf"];
+
+/// Rows of the picture of registrations.
+const DRAWN_ROWS: [&str; 3] = ["icp", "srrf", "srrf+refine"];
+
+/// Puts the report together.
+pub(super) fn document(
+    options: &TablesOptions,
+    stage: &Stage<'_>,
+    evidence: &Evidence,
+    context: &MethodContext,
+) -> Result<Document, EvalError> {
+    let mut sections = Vec::new();
+    if let Some(main) = evidence.parts.get("main") {
+        let pairs = stage.pairs(plan::main_protocol(options, stage.shapes))?;
+        sections.push(losses_section(main));
+        sections.push(main_section(main));
+        sections.push(severity_section(main)?);
+        sections.push(pictures(stage, evidence, &pairs, main, context)?);
+        sections.push(views(evidence, &pairs, main)?);
+    }
+    if let Some(clean) = evidence.parts.get("clean-trained") {
+        let mut section = Section::new("clean-trained", "Models trained on clean pairs");
+        section.text.push("The same pairs as above; the network never saw a corruption in training.".into());
+        section.sheets = sheets::paper_tables(&clean.summary, "-clean-trained");
+        sections.push(section);
+    }
+    sections.push(sampling_section(stage, evidence)?);
+    sections.push(skeleton_section(evidence));
+    sections.push(ablations(evidence));
+    if let Some(main) = evidence.parts.get("main") {
+        let mut section = Section::new("costs", "Time");
+        section.sheets.push(sheets::costs(&main.summary));
+        sections.push(section);
+    }
+    sections.retain(|s| !s.is_empty());
+    Ok(Document {
+        title: "Registration of corrupted pairs: report".into(),
+        facts: facts(options, evidence),
+        sections,
+    })
+}
+
+/// Where the numbers come from. Nothing here differs between two runs of the same command.
+fn facts(options: &TablesOptions, evidence: &Evidence) -> Vec<(String, String)> {
+    let mut facts = Vec::new();
+    let mut fact = |name: &str, value: String| facts.push((name.to_owned(), value));
+    if let Some(measured) = evidence.parts.get("main").or_else(|| evidence.parts.values().next()) {
+        fact("Data", measured.data.clone());
+    }
+    fact("Shapes", evidence.shapes.to_string());
+    fact("Seed", options.seed.to_string());
+    for (method, weights) in &evidence.cast.weights {
+        fact(&format!("Weights of {method}"), weights.clone());
+    }
+    for (name, reason) in evidence.cast.left_out.iter().chain(&evidence.missing) {
+        fact(&format!("Left out: {name}"), reason.clone());
+    }
+    // The place of the program is no part of the command.
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    fact("Command", format!("srrf-eval {}", arguments.join(" ")));
+    fact("Program", format!("srrf-eval {}, device {}", env!("CARGO_PKG_VERSION"), options.device));
+    fact("Machine", crate::report::machine());
+    fact("Time of all answers", format!("{:.0} s on one thread each", seconds(evidence)));
+    facts
+}
+
+/// Sum of the times of all answers; branches of one answer count once.
+fn seconds(evidence: &Evidence) -> f64 {
+    let of = |measured: &Measured| -> f64 {
+        let rows = &measured.outcome.rows;
+        let branch = |row: &String| {
+            rows.iter().any(|other| row.strip_prefix(other.as_str()).is_some_and(|r| r.starts_with('-')))
+        };
+        let counted: Vec<usize> = (0..rows.len()).filter(|&i| !branch(&rows[i])).collect();
+        let answers = measured.outcome.records.iter().flat_map(|r| counted.iter().map(|&i| &r.answers[i]));
+        answers.filter_map(|a| a.seconds).sum()
+    };
+    evidence.parts.values().map(of).sum()
+}
+
+fn losses_section(main: &Measured) -> Section {
+    let mut section = Section::new("losses", "Where SRRF loses");
+    section.text.push("Every place where the printed digits say so, mean of the severities.".into());
+    section.list = losses::losses(&main.summary);
+    section
+}
+
+fn main_section(main: &Measured) -> Section {
+    let mut section = Section::new("tables", "Tables 1 to 3: models trained with corruption");
+    section.text.push(
+        "Both clouds corrupted independently, before the exact pose. RMSE and MAE are over the three Euler angles \
+         (DCP's convention) and the three components of the translation, from one array of errors; a pair on which \
+         a method fails counts as the identity. Recall: under 5 degrees and 0.1."
+            .into(),
+    );
+    section.sheets = sheets::paper_tables(&main.summary, "");
+    section.sheets.extend(sheets::symmetry(&main.summary));
+    section
+}
+
+fn severity_section(main: &Measured) -> Result<Section, EvalError> {
+    let mut section = Section::new("severity", "Error against severity");
+    section.figures = figures::severity_curves(&main.summary)?;
+    section.sheets = sheets::severities(&main.summary, "severity", true);
+    Ok(section)
+}
+
+/// Corruptions, registrations, weights and samplings.
+fn pictures(
+    stage: &Stage<'_>,
+    evidence: &Evidence,
+    pairs: &SynthesizedPairs,
+    main: &Measured,
+    context: &MethodContext,
+) -> Result<Section, EvalError> {
+    let mut section = Section::new("pictures", "Pictures");
+    section.figures.extend(figures::corruption_sheet(pairs, stage.shapes / 3)?);
+    section.figures.extend(figures::registrations(pairs, &main.outcome, &DRAWN_ROWS)?);
+    if evidence.cast.method("srrf").is_some() {
+        let shown = |count: usize| {
+            let count = count.min(main.outcome.groups[0].pairs);
+            let items = (0..count).map(|i| i * main.outcome.groups[0].pairs / count);
+            items
+                .map(|item| Ok(pairs.pair(0, item)?.pair.source))
+                .collect::<Result<Vec<PointCloud>, EvalError>>()
+        };
+        let clouds = shown(3)?;
+        let clouds: Vec<&PointCloud> = clouds.iter().collect();
+        section.figures.push(figures::weights(context, &clouds)?);
+        section.figures.push(figures::samplings(context, &clouds, stage.options.seed)?);
+        section.figures.extend(skeleton_picture(stage, evidence, pairs, main)?);
+    }
+    Ok(section)
+}
+
+/// Skeletons of pairs of several corruptions, by the network and, where there is one, by the network
+/// that was trained without the loss.
+fn skeleton_picture(
+    stage: &Stage<'_>,
+    evidence: &Evidence,
+    pairs: &SynthesizedPairs,
+    main: &Measured,
+) -> Result<Option<super::document::Figure>, EvalError> {
+    let without = super::model_or(stage.options.no_ddl_weights.as_deref(), "srrf-no-ddl");
+    let without = without.map(|weights| {
+        let context = MethodContext { weights: Some(weights), device: stage.options.device.clone() };
+        super::Cast::new(&["srrf".to_owned()], &context)
+    });
+    let without = without.transpose()?;
+    let mut networks: Vec<(&str, &dyn Register)> = Vec::new();
+    if let Some(method) = without.as_ref().and_then(|cast| cast.method("srrf")) {
+        networks.push(("without the loss", &*method.register));
+    }
+    let Some(method) = evidence.cast.method("srrf") else { return Ok(None) };
+    networks.push(("with the loss", &*method.register));
+    let mut shown: Vec<(String, Pair)> = Vec::new();
+    for wanted in ["density_dec", "cutout", "gaussian", "background", "shear", "distortion_rbf"] {
+        let group = main.outcome.groups.iter().position(|g| g.corruption == wanted && g.severity == 3);
+        let Some(group) = group else { continue };
+        let item = (shown.len() * 5 + 1) % main.outcome.groups[group].pairs;
+        shown.push((wanted.to_owned(), pairs.pair(group, item)?.pair));
+    }
+    Ok(figures::agreement(&networks, &shown))
+}
+
+fn views(evidence: &Evidence, pairs: &SynthesizedPairs, main: &Measured) -> Result<Section, EvalError> {
+    let mut section = Section::new("pairs", "Chosen pairs in 3D");
+    section.text.push(
+        "A typical pair of each corruption at severity 3 (median error of srrf among shapes without an axis of \
+         symmetry) and three of the worst. Choose a pair and a pose; drag to turn."
+            .into(),
+    );
+    let network = evidence.cast.method("srrf").map(|m| &*m.register as &dyn Register);
+    section.html = chosen::viewer(pairs, &main.outcome, network)?;
+    Ok(section)
+}
+
+fn sampling_section(stage: &Stage<'_>, evidence: &Evidence) -> Result<Section, EvalError> {
+    let mut section = Section::new("table4", "Table 4: few points, chosen in three ways");
+    let Some(measured) = evidence.parts.get("table4") else { return Ok(section) };
+    section.text.push(format!("{}.", measured.data));
+    section.sheets.push(sheets::plain(
+        "table4",
+        "Table 4: clean pairs reduced to few points",
+        "Corresponding subsets are one subset of the source, posed: their points match exactly. Independent ones \
+         are chosen in each cloud by itself; both clouds show the same points of the shape, in another order. The \
+         paper (DCP, RMSE(R) / MAE(R)): original 2.564 / 1.513, random 2.205 / 1.370, farthest point 2.297 / 1.288, \
+         skeleton 1.464 / 0.888.",
+        &measured.summary,
+    ));
+    let row = SAMPLED_ROWS.iter().rev().find(|r| measured.outcome.rows.iter().any(|row| row == *r));
+    if let (Some(row), Some(method)) = (row, evidence.cast.method("srrf")) {
+        let pairs = stage.sampled(&*method.register)?;
+        section.figures.extend(figures::sampled_registrations(&pairs, &measured.outcome, row, 0)?);
+    }
+    Ok(section)
+}
+
+fn skeleton_section(evidence: &Evidence) -> Section {
+    let mut section = Section::new("table5", "Table 5: skeletons");
+    if let Some(main) = evidence.parts.get("main") {
+        let without = evidence.parts.get("table5").map(|m| &m.summary);
+        section.sheets.extend(sheets::skeletons(&main.summary, without));
+    }
+    section
+}
+
+fn ablations(evidence: &Evidence) -> Section {
+    let mut section = Section::new("ablations", "Ablations");
+    section.text.push(
+        "Dense branch, skeleton branch and fusion are rows of every table. The number of skeleton points is fixed by \
+         the weights: its ablation needs models trained with other numbers."
+            .into(),
+    );
+    let middle = SeverityKey::One(plan::MIDDLE.get());
+    let main = evidence.parts.get("main");
+    let compared = [
+        (
+            "one-sided",
+            "One or both clouds corrupted",
+            "both",
+            "target only",
+            "Severity 3, the same shapes and poses.",
+        ),
+        (
+            "independent",
+            "Shared or independent sampling",
+            "shared",
+            "independent",
+            "Severity 3. Shared: both clouds start from the same points of the shape. Independent: from disjoint \
+             halves of a stored cloud, each of half the points, filled up by repeats, or from two samplings of a \
+             surface.",
+        ),
+    ];
+    for (key, title, first, second, note) in compared {
+        if let (Some(main), Some(other)) = (main, evidence.parts.get(key)) {
+            let columns = [
+                Column { name: first, summary: &main.summary, severity: middle },
+                Column { name: second, summary: &other.summary, severity: middle },
+            ];
+            section.sheets.extend(sheets::compare(key, title, note, &columns));
+        }
+    }
+    if let (Some(main), Some(beyond)) = (main, evidence.parts.get("beyond")) {
+        let at = |summary, severity| Column {
+            name: ["s = 5", "s = 6", "s = 7"][usize::from(severity) - 5],
+            summary,
+            severity: SeverityKey::One(severity),
+        };
+        let columns = [at(&main.summary, 5), at(&beyond.summary, 6), at(&beyond.summary, 7)];
+        let note = "Training knew severities 1 to 5. Beyond, every parameter goes on by its step from 4 to 5; \
+                    upsampling, which copies every point at 5, has no more to copy.";
+        section.sheets.extend(sheets::compare("beyond", "Beyond the severities of training", note, &columns));
+    }
+    if let Some(mixtures) = evidence.parts.get("mixtures") {
+        let columns = [Column { name: "s = 3", summary: &mixtures.summary, severity: middle }];
+        let note = "Two corruptions at once, one after the other; and `local`: only the half of the points farthest in \
+                    a random direction, another one in each cloud.";
+        section.sheets.extend(sheets::compare("mixtures", "Heterogeneous corruption", note, &columns));
+    }
+    if let Some(measured) = evidence.parts.get("thresholds") {
+        let title = "Inlier test and threshold of the integration, severity 3";
+        section.sheets.push(sheets::plain("thresholds", title, thresholds::NOTE, &measured.summary));
+    }
+    section
+}

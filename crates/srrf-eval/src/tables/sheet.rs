@@ -1,0 +1,197 @@
+//! [`Sheet`]: one table of the report, as Markdown, CSV and HTML.
+
+use std::fmt::Write;
+
+use crate::table::aligned;
+
+/// A cell of a [`Sheet`].
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Cell {
+    /// Words.
+    Text(String),
+    /// A number with the digits to print.
+    Number(f64, usize),
+    /// The best number of its kind.
+    Best(f64, usize),
+    /// Nothing is known.
+    None,
+}
+
+impl Cell {
+    /// A number, where there is one.
+    pub fn number(value: Option<f64>, digits: usize) -> Self {
+        value.filter(|v| v.is_finite()).map_or(Self::None, |v| Self::Number(v, digits))
+    }
+
+    /// The value of a number.
+    pub fn value(&self) -> Option<f64> {
+        match self {
+            Self::Number(value, _) | Self::Best(value, _) => Some(*value),
+            Self::Text(_) | Self::None => None,
+        }
+    }
+
+    fn printed(&self) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Number(value, digits) | Self::Best(value, digits) => format!("{value:.digits$}"),
+            Self::None => "-".into(),
+        }
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+}
+
+/// A table.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sheet {
+    /// Name of its file, and of its place in the page.
+    pub key: String,
+    /// Its heading.
+    pub title: String,
+    /// What to know before reading it, a paragraph; may be empty.
+    pub note: String,
+    /// Headings of the columns.
+    pub head: Vec<String>,
+    /// The rows, each as long as the head.
+    pub rows: Vec<Vec<Cell>>,
+}
+
+impl Sheet {
+    /// An empty table.
+    pub fn new(key: &str, title: &str, note: &str, head: &[&str]) -> Self {
+        let head = head.iter().map(|h| (*h).to_owned()).collect();
+        Self { key: key.into(), title: title.into(), note: note.into(), head, rows: Vec::new() }
+    }
+
+    /// Marks the best number of each of `columns` among the rows `from..` for which `competes` holds;
+    /// the flag of a column says whether more is better. What prints alike is equally good.
+    pub fn mark_best(&mut self, from: usize, columns: &[(usize, bool)], competes: impl Fn(&[Cell]) -> bool) {
+        let rows = &mut self.rows[from..];
+        for &(column, more_is_better) in columns {
+            let better = |a: f64, b: f64| if more_is_better { a > b } else { a < b };
+            let contenders: Vec<Cell> =
+                rows.iter().filter(|r| competes(r)).map(|r| r[column].clone()).collect();
+            let numbers = contenders.iter().filter_map(Cell::value);
+            if numbers.clone().count() < 2 {
+                continue;
+            }
+            let Some(best) = numbers.reduce(|a, b| if better(b, a) { b } else { a }) else { continue };
+            for row in rows.iter_mut().filter(|r| competes(r)) {
+                if let Cell::Number(value, digits) = row[column]
+                    && format!("{value:.digits$}") == format!("{best:.digits$}")
+                {
+                    row[column] = Cell::Best(value, digits);
+                }
+            }
+        }
+    }
+
+    /// As Markdown, under a heading of the third level.
+    pub fn markdown(&self) -> String {
+        let mut lines = vec![self.head.clone()];
+        for row in &self.rows {
+            let bold = |cell: &Cell| match cell {
+                Cell::Best(..) => format!("**{}**", cell.printed()),
+                _ => cell.printed(),
+            };
+            lines.push(row.iter().map(bold).collect());
+        }
+        let note = if self.note.is_empty() { String::new() } else { format!("{}\n\n", self.note) };
+        format!("### {}\n\n{note}{}", self.title, aligned(&lines))
+    }
+
+    /// As CSV, numbers in full.
+    pub fn csv(&self) -> String {
+        let quoted = |text: &str| {
+            if text.contains([',', '"', '\n']) {
+                format!("\"{}\"", text.replace('"', "\"\""))
+            } else {
+                text.to_owned()
+            }
+        };
+        let line = |cells: Vec<String>| cells.join(",") + "\n";
+        let mut text = line(self.head.iter().map(|h| quoted(h)).collect());
+        for row in &self.rows {
+            let cell = |cell: &Cell| match cell {
+                Cell::Text(words) => quoted(words),
+                Cell::Number(value, _) | Cell::Best(value, _) => value.to_string(),
+                Cell::None => String::new(),
+            };
+            text += &line(row.iter().map(cell).collect());
+        }
+        text
+    }
+
+    /// As HTML; the page's script makes the headings sort the rows.
+    pub fn html(&self) -> String {
+        let mut html =
+            format!("<section class=\"sheet\" id=\"{}\"><h3>{}</h3>", escape(&self.key), escape(&self.title));
+        if !self.note.is_empty() {
+            html += &format!("<p>{}</p>", escape(&self.note));
+        }
+        html += "<div class=\"scroll\"><table><thead><tr>";
+        for head in &self.head {
+            html += &format!("<th scope=\"col\"><button type=\"button\">{}</button></th>", escape(head));
+        }
+        html += "</tr></thead><tbody>\n";
+        for row in &self.rows {
+            html += "<tr>";
+            for cell in row {
+                let printed = escape(&cell.printed());
+                // Writing to a String cannot fail.
+                let _ = match cell {
+                    Cell::Text(_) => write!(html, "<td>{printed}</td>"),
+                    Cell::Number(value, _) => write!(html, "<td data-v=\"{value}\">{printed}</td>"),
+                    Cell::Best(value, _) => write!(html, "<td data-v=\"{value}\"><b>{printed}</b></td>"),
+                    Cell::None => write!(html, "<td data-v=\"\">{printed}</td>"),
+                };
+            }
+            html += "</tr>\n";
+        }
+        html + "</tbody></table></div></section>\n"
+    }
+}
+
+/// Text for HTML, in elements and quoted attributes.
+pub(crate) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sheet() -> Sheet {
+        let mut sheet = Sheet::new("k", "A <title>", "Read \"this\".", &["method", "error", "recall"]);
+        for (name, error, recall) in
+            [("oracle", 0.5, 1.0), ("a", 2.001, 0.7), ("b", 2.0, 0.9), ("c", 3.0, 0.1)]
+        {
+            sheet.rows.push(vec![name.into(), Cell::Number(error, 2), Cell::Number(recall, 1)]);
+        }
+        sheet.rows.push(vec!["d, not run".into(), Cell::None, Cell::number(Some(f64::NAN), 1)]);
+        sheet.mark_best(0, &[(1, false), (2, true)], |row| row[0] != "oracle".into());
+        sheet
+    }
+
+    #[test]
+    fn the_best_is_bold_and_what_prints_alike_too() {
+        let text = sheet().markdown();
+        assert_eq!(text.matches("**2.00**").count(), 2, "{text}");
+        assert_eq!(text.matches("**").count(), 2 * 3, "{text}");
+        assert!(text.contains("**0.9**") && text.contains("Read \"this\"."), "{text}");
+    }
+
+    #[test]
+    fn csv_keeps_all_digits_and_html_escapes() {
+        let csv = sheet().csv();
+        assert!(csv.contains("\na,2.001,0.7\n") && csv.contains("\"d, not run\",,\n"), "{csv}");
+        let html = sheet().html();
+        assert!(html.contains("A &lt;title&gt;") && html.contains("data-v=\"2.001\"><b>2.00</b>"), "{html}");
+        assert_eq!(html.matches("<tr>").count(), 6);
+    }
+}

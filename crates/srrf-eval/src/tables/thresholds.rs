@@ -1,0 +1,76 @@
+//! The ablation of the integration: inlier test, its threshold, and no weighing at all.
+
+use srrf_cloud::{PointCloud, Register, RegisterError, Registration};
+use srrf_corrupt::CorruptionKind;
+use srrf_model::{InlierTest, SrrfRegister};
+
+use crate::EvalError;
+use crate::methods::{Method, MethodContext, network};
+
+/// The corruptions that are scored: two of density, two of noise, one of shape.
+pub(crate) const CORRUPTIONS: [CorruptionKind; 5] = [
+    CorruptionKind::DensityDec,
+    CorruptionKind::Cutout,
+    CorruptionKind::Gaussian,
+    CorruptionKind::Background,
+    CorruptionKind::DistortionRbf,
+];
+
+/// A variant: its row, the test, the two thresholds (dense, skeleton), the sharpness.
+type Variant = (&'static [&'static str], InlierTest, [f64; 2], f64);
+
+const VARIANTS: [Variant; 6] = [
+    (&["nearest 0.03"], InlierTest::Nearest, [0.03; 2], 1.0),
+    (&["nearest 0.05"], InlierTest::Nearest, [0.05; 2], 1.0),
+    (&["nearest 0.1"], InlierTest::Nearest, [0.1; 2], 1.0),
+    (&["nearest 0.2"], InlierTest::Nearest, [0.2; 2], 1.0),
+    (&["soft match 0.05, 0.1"], InlierTest::SoftMatch, [0.05, 0.1], 1.0),
+    (&["lambda 0.5"], InlierTest::Nearest, [0.05; 2], 0.0),
+];
+
+/// What the names of the variants say, for the note of the table.
+pub(crate) const NOTE: &str = "\
+Weights of the two branches by the share of inliers, from one set of trained weights. `nearest t`: a point of \
+the source counts when the branch's pose brings it closer than t to the target; `soft match`: the paper's words, \
+a correspondence counts when its residual is below the threshold of its branch; `lambda 0.5`: no weighing. \
+Thresholds are in network units.";
+
+/// The network under the name of a variant.
+struct Named {
+    inner: SrrfRegister,
+    name: &'static str,
+}
+
+impl Register for Named {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+        self.inner.register(source, target)
+    }
+}
+
+/// All variants with the rows that they fill.
+///
+/// # Errors
+/// [`EvalError::Setup`] where the weights cannot be had.
+pub(crate) fn methods(context: &MethodContext) -> Result<Vec<(&'static [&'static str], Method)>, EvalError> {
+    let set_up = |&(rows, test, [dense, skeleton], sharpness): &Variant| {
+        let (mut loaded, weights) = network(context)?;
+        loaded.config.integration.test = test;
+        loaded.config.integration.dense_threshold = dense;
+        loaded.config.integration.skeleton_threshold = skeleton;
+        loaded.config.integration.sharpness = sharpness;
+        let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
+        let method = Method {
+            register: Box::new(Named { inner: SrrfRegister::new(loaded, device), name: rows[0] }),
+            weights: Some(weights),
+            settings: format!("{test:?}, thresholds {dense} and {skeleton}, sharpness {sharpness}"),
+            parallel_inside: false,
+        };
+        Ok((rows, method))
+    };
+    let named = |problem: String| EvalError::Setup { name: "srrf".into(), problem };
+    VARIANTS.iter().map(|variant| set_up(variant).map_err(named)).collect()
+}
