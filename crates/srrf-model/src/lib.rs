@@ -32,7 +32,7 @@ pub mod weights;
 
 pub use batch::{PairBatch, PairFrame};
 pub use branch::{Branch, BranchConfig, BranchOutput};
-pub use device::{NAMES as DEVICE_NAMES, UnknownDevice, device};
+pub use device::{DeviceError, NAMES as DEVICE_NAMES, built_in as built_in_devices, device};
 pub use integration::{BranchPose, Fusion, InlierTest, IntegrationConfig};
 pub use loss::{correspondence_loss, registration_loss};
 pub use matching::{SoftMatches, SoftMatching};

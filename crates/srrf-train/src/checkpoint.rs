@@ -129,9 +129,13 @@ pub fn load(
     let header = header.metadata().clone().unwrap_or_default();
     let entry = |key: &str| header.get(key).ok_or_else(|| broken(format!("no `{key}` in its header")));
     let progress: Progress = serde_json::from_str(entry("progress")?).map_err(|e| broken(e.to_string()))?;
-    let saved: serde_json::Value =
+    let mut saved: serde_json::Value =
         serde_json::from_str(entry("config")?).map_err(|e| broken(e.to_string()))?;
-    let wanted = serde_json::to_value(config).map_err(|e| broken(e.to_string()))?;
+    let mut wanted = serde_json::to_value(config).map_err(|e| broken(e.to_string()))?;
+    // A run may go on on another device.
+    for config in [&mut saved, &mut wanted].into_iter().filter_map(|config| config.as_object_mut()) {
+        config.remove("device");
+    }
     if let Some(key) = first_difference(&saved, &wanted, String::new()) {
         return Err(CheckpointError::OtherConfig { path, why: format!("`{key}` differs") });
     }

@@ -52,6 +52,10 @@ pub struct TrainConfig {
     /// Their network must have the sizes of this one.
     #[serde(default)]
     pub start: Option<String>,
+    /// Where the network runs (`flex`, `ndarray`, `wgpu`, `vulkan`, `cuda`); `--device` comes before
+    /// it, and `flex` is used if neither is given. A run may go on on another device.
+    #[serde(default)]
+    pub device: Option<String>,
     /// The shapes.
     pub data: DataConfig,
     /// How pairs are drawn.

@@ -44,9 +44,10 @@ struct Arguments {
     /// Worker threads; changes the time, not the result [default: all cores].
     #[arg(long)]
     threads: Option<usize>,
-    /// Device: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda` where built in.
-    #[arg(long, default_value = "flex")]
-    device: String,
+    /// Device: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda` where built in [default: `device` of
+    /// the configuration, or flex].
+    #[arg(long)]
+    device: Option<String>,
 }
 
 /// A message and an exit code: 2 for bad usage or input, 1 for a failure.
@@ -70,8 +71,10 @@ fn tell(message: &str) {
 
 fn train(arguments: Arguments) -> Result<ExitCode, Failure> {
     let usage = |e: &dyn std::fmt::Display| Failure(2, e.to_string());
-    let config = TrainConfig::read(&arguments.config).map_err(|e| usage(&e))?;
-    let device = srrf_model::device(&arguments.device).map_err(|e| usage(&e))?;
+    let mut config = TrainConfig::read(&arguments.config).map_err(|e| usage(&e))?;
+    let name = arguments.device.or(config.device.take()).unwrap_or_else(|| "flex".into());
+    let device = srrf_model::device(&name).map_err(|e| usage(&e))?;
+    config.device = Some(name.clone());
     let shapes = shapes(&config, arguments.data.as_deref()).map_err(|e| Failure(2, e))?;
     let options = RunOptions {
         folder: arguments.run.unwrap_or_else(|| Path::new("runs").join(&config.name)),
@@ -91,12 +94,7 @@ fn train(arguments: Arguments) -> Result<ExitCode, Failure> {
         .map_err(|e| Failure(1, format!("no handler for Ctrl-C: {e}")))?;
 
     tell(&format!("config {}, data {}", arguments.config.display(), shapes.description()));
-    tell(&format!(
-        "run {}, device {}, {} threads",
-        options.folder.display(),
-        arguments.device,
-        options.threads
-    ));
+    tell(&format!("run {}, device {}, {} threads", options.folder.display(), name, options.threads));
     let ended = run(&config, &options, shapes, device, &stop).map_err(|e| {
         let code = if matches!(e, RunError::Exists { .. } | RunError::Checkpoint(_)) { 2 } else { 1 };
         Failure(code, e.to_string())

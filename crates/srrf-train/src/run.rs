@@ -129,7 +129,7 @@ pub struct Ended {
 }
 
 /// The optimiser of a configuration.
-fn optimizer(config: &OptimizerConfig) -> ModuleOptimizer {
+pub fn optimizer(config: &OptimizerConfig) -> ModuleOptimizer {
     let (beta_2, decay) = (config.beta_2 as f32, config.weight_decay as f32);
     match config.kind {
         OptimizerKind::Adam => {

@@ -16,15 +16,14 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use burn::module::Module;
-use burn::optim::decay::WeightDecayConfig;
-use burn::optim::{AdamConfig, AdamWConfig, ModuleOptimizer};
 use burn::tensor::Device;
 use clap::{Parser, ValueEnum};
 use serde_json::{Map, Value, json};
 use srrf_corrupt::Pair;
 use srrf_model::{PairBatch, Srrf, init, keep_freed_memory};
-use srrf_train::config::{OptimizerKind, StageConfig, TrainConfig};
+use srrf_train::config::{StageConfig, TrainConfig};
 use srrf_train::data::TrainingPairs;
+use srrf_train::run::optimizer;
 use srrf_train::step::{StepContext, Workers, gradient, scale};
 
 use crate::clock::{median, memory_mib, summary, timed};
@@ -46,6 +45,9 @@ struct Arguments {
     /// What is timed.
     #[arg(long, value_enum, default_value = "registration_step")]
     figure: Figure,
+    /// Where the network runs.
+    #[arg(long, default_value = "flex")]
+    device: String,
     /// Worker threads.
     #[arg(long, default_value_t = 2)]
     threads: usize,
@@ -81,7 +83,7 @@ fn main() -> Result<(), Failure> {
     let arguments = Arguments::parse();
     let mut config = TrainConfig::read(&arguments.config)?;
     config.draw.independent = 0.0; // every pair has pairs.points points a cloud
-    let bench = Bench::new(config)?;
+    let bench = Bench::new(config, &arguments.device)?;
     let start_mib = memory_mib("VmHWM:");
     let mut found = if arguments.profile {
         profile(&bench, &arguments)?
@@ -98,6 +100,7 @@ fn main() -> Result<(), Failure> {
     };
     let figure = arguments.figure.to_possible_value().map(|v| v.get_name().to_string());
     found.insert("figure".into(), json!(if arguments.profile { Some("profile".into()) } else { figure }));
+    found.insert("device".into(), json!(arguments.device));
     found.insert("threads".into(), json!(if arguments.profile { 1 } else { arguments.threads }));
     println!("{}", Value::Object(found));
     Ok(())
@@ -112,8 +115,8 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(config: TrainConfig) -> Result<Self, Failure> {
-        let device = srrf_model::device("flex")?;
+    fn new(config: TrainConfig, device: &str) -> Result<Self, Failure> {
+        let device = srrf_model::device(device)?;
         let pairs = TrainingPairs::new(&config, Box::new(Stored::new(config.seed, config.pairs.points)?))?;
         let model = init::seeded(config.network.init(&device), config.seed).valid();
         Ok(Self { config, pairs, device, model })
@@ -139,7 +142,7 @@ impl Bench {
             shard: optimizer_config.shard,
         };
         let workers = Workers::new(arguments.threads)?;
-        let mut optimizer = optimizer(&self.config);
+        let mut optimizer = optimizer(optimizer_config);
         let mut model = self.model.clone();
         let mut loss = 0.0;
         let mut step = 0;
@@ -192,19 +195,5 @@ impl Bench {
             if done { Ok(()) } else { Err("a forward pass failed".into()) }
         })?;
         Ok(summary(&times))
-    }
-}
-
-/// The optimiser of a configuration, as `srrf-train` makes it.
-fn optimizer(config: &TrainConfig) -> ModuleOptimizer {
-    let (beta_2, decay) = (config.optimizer.beta_2 as f32, config.optimizer.weight_decay as f32);
-    match config.optimizer.kind {
-        OptimizerKind::Adam => {
-            let adam = AdamConfig::new().with_beta_2(beta_2).with_epsilon(1e-8);
-            adam.with_weight_decay((decay > 0.0).then(|| WeightDecayConfig::new(decay))).init()
-        }
-        OptimizerKind::Adamw => {
-            AdamWConfig::new().with_beta_2(beta_2).with_epsilon(1e-8).with_weight_decay(decay).init()
-        }
     }
 }

@@ -10,10 +10,11 @@ use srrf_model::{
     registration_loss, skeleton_loss,
 };
 use srrf_train::config::TrainConfig;
+use srrf_train::run::optimizer;
 use srrf_train::step::to_batch;
 
 use crate::clock::{clock, median};
-use crate::{Arguments, Bench, Failure, PHASE, optimizer};
+use crate::{Arguments, Bench, Failure, PHASE};
 
 /// Times of named parts.
 struct Parts<'a> {
@@ -123,7 +124,7 @@ fn registration_stage(parts: &mut Parts, config: &TrainConfig, model: &Srrf, sha
         }
         total
     };
-    let (mut optimizer, mut model) = (optimizer(config), model.clone());
+    let (mut optimizer, mut model) = (optimizer(&config.optimizer), model.clone());
     let names =
         ["registration_forward", "registration_losses", "registration_backward", "registration_optimizer"];
     parts.rounds(&names, || {

@@ -1,0 +1,257 @@
+//! One suite for every backend: the forward pass, the gradients of all losses, and five training steps, on
+//! clouds of built-in shapes, against flex with its custom operations in `f32`.
+//!
+//! Held against it are flex in `f64`, which takes Burn's own operations throughout, and each backend
+//! that this program was built with. A backend that this machine cannot run is skipped with a word, unless
+//! `$SRRF_REQUIRE_DEVICE` names it.
+//!
+//! Tolerances, in shares of the largest number compared. Sums in another order differ by some 1e-6 in `f32`;
+//! ten layers, a softmax and the 3 x 3 SVD make up to 1e-5 of it in the output ([`FORWARD`]), and the way
+//! back doubles the depth ([`GRADIENT`]). Adam divides by the gradient's own size, so that parameters whose
+//! gradient is rounding alone move by whole steps in a direction of their own: five steps are compared
+//! by their losses ([`LOSSES`]) and by the norm of what all parameters moved together ([`MOVED`]).
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "a test says what it skips")]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
+use burn::optim::GradientsParams;
+use burn::tensor::{DType, Device, Tensor};
+use srrf_cloud::shapes::ProceduralShapes;
+use srrf_model::weights::parameters;
+use srrf_model::{Srrf, correspondence_loss, init, registration_loss, skeleton_loss};
+use srrf_train::config::TrainConfig;
+use srrf_train::data::TrainingPairs;
+use srrf_train::run::optimizer;
+use srrf_train::step::{StepContext, Workers, gradient, to_batch};
+
+const FORWARD: f64 = 1e-4;
+const GRADIENT: f64 = 1e-3;
+const LOSSES: f64 = 1e-3;
+const MOVED: f64 = 3e-2;
+
+const PAIRS: usize = 3;
+const STEPS: usize = 5;
+const PHASE: f32 = 0.5;
+
+/// What one pass gave: named numbers.
+type Numbers = BTreeMap<String, Vec<f64>>;
+
+/// The smoke configuration with whole clouds, so that every shard has the same shapes, and small batches.
+fn config() -> TrainConfig {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/smoke.toml");
+    let mut config = TrainConfig::read(&path).unwrap();
+    config.draw.independent = 0.0;
+    (config.optimizer.batch, config.optimizer.shard) = (4, 2);
+    config
+}
+
+fn pairs(config: &TrainConfig) -> TrainingPairs {
+    let shapes = ProceduralShapes::new(config.seed, config.data.shapes, None).unwrap();
+    TrainingPairs::new(config, Box::new(shapes)).unwrap()
+}
+
+fn network(config: &TrainConfig, device: &Device) -> Srrf {
+    init::seeded(config.network.init(device), config.seed)
+}
+
+struct Cast(DType);
+
+impl ModuleMapper for Cast {
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let (id, tensor, mapper) = param.consume();
+        Param::from_mapped_value(id, tensor.cast(self.0), mapper)
+    }
+}
+
+/// The gradient of every parameter by its path.
+struct Gradients {
+    all: GradientsParams,
+    path: Vec<String>,
+    found: Numbers,
+}
+
+impl ModuleVisitor for Gradients {
+    fn enter_module(&mut self, name: &str, _container_type: &str) {
+        self.path.push(name.to_string());
+    }
+
+    fn exit_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.pop();
+    }
+
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        if let Some(gradient) = self.all.remove::<D>(param.id) {
+            self.found.insert(self.path.join("."), values(&gradient));
+        }
+    }
+}
+
+fn values<const D: usize>(tensor: &Tensor<D>) -> Vec<f64> {
+    tensor.try_to_vec_as::<f64>().unwrap()
+}
+
+/// Poses, matches and skeletons of some pairs, and the gradient of the sum of all losses.
+fn pass(device: &Device, dtype: DType) -> (Numbers, Numbers) {
+    let config = config();
+    let (batch, rotation, translation) = to_batch(&pairs(&config).shard(0, PAIRS).unwrap(), device).unwrap();
+    let (source, target) = (batch.source.cast(dtype), batch.target.cast(dtype));
+    let (rotation, translation) = (rotation.cast(dtype), translation.cast(dtype));
+    let model = network(&config, device).map(&mut Cast(dtype)).train();
+    let output = model.forward(&config.network.integration, source.clone(), target.clone(), PHASE);
+
+    let mut found = Numbers::new();
+    let fused = (output.fused.rotation.clone(), output.fused.translation.clone());
+    let mut total =
+        registration_loss(fused.0.clone(), fused.1.clone(), rotation.clone(), translation.clone());
+    found.insert("fused rotation".into(), values(&fused.0.detach()));
+    found.insert("fused translation".into(), values(&fused.1.detach()));
+    for (name, branch) in [("dense", &output.dense), ("skeleton", &output.skeleton)] {
+        let (r, t) = (branch.rotation.clone(), branch.translation.clone());
+        found.insert(format!("{name} rotation"), values(&r.clone().detach()));
+        found.insert(format!("{name} translation"), values(&t.clone().detach()));
+        found.insert(format!("{name} matches"), values(&branch.matches.clone().detach()));
+        let (points, matches) = (branch.source_points.clone(), branch.matches.clone());
+        total = total
+            + registration_loss(r, t, rotation.clone(), translation.clone())
+            + correspondence_loss(points, matches, rotation.clone(), translation.clone());
+    }
+    found.insert("skeleton".into(), values(&output.source_skeleton.points.clone().detach()));
+    found.insert("radii".into(), values(&output.source_skeleton.radii.clone().detach()));
+    let (x, y) = ((source, &output.source_skeleton), (target, &output.target_skeleton));
+    total = total + skeleton_loss(&config.losses.skeleton, x, y, rotation, translation).total;
+
+    let all = GradientsParams::from_grads(total.backward(), &model);
+    let mut gradients = Gradients { all, path: Vec::new(), found: Numbers::new() };
+    model.visit(&mut gradients);
+    (found, gradients.found)
+}
+
+/// The loss of each of five training steps, and what every parameter moved.
+fn train(device: &Device) -> (Vec<f64>, Vec<f64>) {
+    let config = config();
+    let (pairs, workers) = (pairs(&config), Workers::new(2).unwrap());
+    let context = StepContext {
+        stage: config.stages.iter().find(|stage| stage.registration).unwrap(),
+        losses: &config.losses,
+        integration: &config.network.integration,
+        pairs: &pairs,
+        device,
+        batch: config.optimizer.batch,
+        shard: config.optimizer.shard,
+    };
+    let mut optimizer = optimizer(&config.optimizer);
+    let mut model = network(&config, device).valid();
+    let start = flat(&model);
+    let mut losses = Vec::new();
+    for step in 0..STEPS {
+        let outcome = gradient(&context, &model, step, &workers).unwrap();
+        losses.push(outcome.losses["total"]);
+        let rate = context.stage.learning_rate;
+        model = optimizer.step(rate, model.clone().train(), outcome.gradients).valid();
+    }
+    (losses, flat(&model).iter().zip(start).map(|(after, before)| after - before).collect())
+}
+
+fn flat(model: &Srrf) -> Vec<f64> {
+    parameters(model).into_values().flat_map(|(_, values)| values).map(f64::from).collect()
+}
+
+fn largest(numbers: &[f64]) -> f64 {
+    numbers.iter().fold(0.0, |most, v| if v.abs() > most || v.is_nan() { v.abs() } else { most })
+}
+
+/// Largest difference; not a number if any of them is not.
+fn apart(ours: &[f64], wanted: &[f64]) -> f64 {
+    assert_eq!(ours.len(), wanted.len());
+    largest(&ours.iter().zip(wanted).map(|(a, b)| a - b).collect::<Vec<_>>())
+}
+
+/// Compares what two devices gave by name; differences count in shares of the largest number under
+/// the name, but of no less than `least` times the largest of all. Gives the largest share.
+fn compare(what: &str, (ours, wanted): (&Numbers, &Numbers), least: f64, tolerance: f64) -> f64 {
+    assert!(ours.keys().eq(wanted.keys()), "{what}: other names");
+    let most = wanted.values().map(|numbers| largest(numbers)).fold(0.0, f64::max);
+    let mut worst = 0.0_f64;
+    for (name, wanted) in wanted {
+        let share = apart(&ours[name], wanted) / largest(wanted).max(least * most);
+        assert!(share <= tolerance, "{what}, {name}: {share:e} apart, {tolerance:e} allowed");
+        worst = worst.max(share);
+    }
+    worst
+}
+
+/// Holds a device against flex.
+fn agrees(name: &str, device: &Device, dtype: DType) {
+    let (wanted, wanted_gradients) = pass(&Device::flex(), DType::F32);
+    assert!(wanted.len() == 10 && wanted_gradients.len() > 50, "something to compare");
+    let (found, gradients) = pass(device, dtype);
+    let forward = compare(&format!("{name}, forward"), (&found, &wanted), 0.0, FORWARD);
+    // Some gradients are 0 by construction and come out as what rounding leaves.
+    let what = format!("{name}, gradient");
+    let backward = compare(&what, (&gradients, &wanted_gradients), 1e-2, GRADIENT);
+    eprintln!("{name}: forward {forward:.1e}, gradients {backward:.1e}");
+}
+
+/// Holds five training steps on a device against flex.
+fn trains(name: &str, device: &Device) {
+    let (wanted, wanted_moved) = train(&Device::flex());
+    let (found, moved) = train(device);
+    let losses = found.iter().zip(&wanted).map(|(a, b)| ((a - b) / b).abs()).fold(0.0, f64::max);
+    assert!(found.iter().all(|loss| loss.is_finite()) && losses <= LOSSES, "{name}: {found:?}, {wanted:?}");
+    let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let difference: Vec<f64> = moved.iter().zip(&wanted_moved).map(|(a, b)| a - b).collect();
+    let share = norm(&difference) / norm(&wanted_moved);
+    assert!(share <= MOVED, "{name}: the parameters moved {share:e} apart, {MOVED:e} allowed");
+    eprintln!("{name}: losses {losses:.1e}, parameters after {STEPS} steps {share:.1e}");
+}
+
+/// The whole suite on a device of this program, if this machine can run it.
+#[allow(dead_code, reason = "the default build has flex alone")]
+fn suite(name: &str) {
+    let required = std::env::var("SRRF_REQUIRE_DEVICE").is_ok_and(|wanted| wanted == name);
+    match srrf_model::device(name) {
+        Ok(device) => {
+            agrees(name, &device, DType::F32);
+            trains(name, &device);
+        }
+        Err(e) if required => panic!("{e}"),
+        Err(e) => eprintln!("skipped: {e}"),
+    }
+}
+
+#[test]
+fn flex_with_burns_own_operations_in_f64_agrees() {
+    agrees("flex in f64", &Device::flex(), DType::F64);
+}
+
+#[test]
+fn five_steps_teach_something() {
+    let (losses, moved) = train(&Device::flex());
+    assert!(losses.len() == STEPS && largest(&moved) > 1e-3, "{losses:?}");
+}
+
+#[cfg(feature = "ndarray")]
+#[test]
+fn ndarray_agrees() {
+    suite("ndarray");
+}
+
+#[cfg(feature = "wgpu")]
+#[test]
+fn wgpu_agrees() {
+    suite("wgpu");
+}
+
+#[cfg(feature = "vulkan")]
+#[test]
+fn vulkan_agrees() {
+    suite("vulkan");
+}
+
+#[cfg(feature = "cuda")]
+#[test]
+fn cuda_agrees() {
+    suite("cuda");
+}
