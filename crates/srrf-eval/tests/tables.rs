@@ -117,6 +117,7 @@ fn what_cannot_be_used_is_named() {
     assert!(message(&["--methods", "magic"]).contains("`magic`"));
     assert!(message(&["--shapes", "0"]).contains("--shapes 0"));
     assert!(message(&["--parts", "everything"]).contains("everything"));
+    assert!(message(&["--variant", "file"]).contains("--variant"));
     assert!(message(&["--data", "nowhere"]).contains("nowhere"));
     fs::write(folder.path().join("file"), "").unwrap();
     assert!(message(&["--cache", "file/cache"]).contains("--cache"));

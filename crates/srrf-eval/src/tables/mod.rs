@@ -23,8 +23,6 @@ mod write;
 
 use std::collections::BTreeMap;
 
-use srrf_corrupt::Severity;
-
 pub use options::TablesOptions;
 
 use crate::cache::Cache;
@@ -39,6 +37,9 @@ use sampling::SampledPairs;
 
 /// Built-in shapes that are scored without data.
 const BUILT_IN_SHAPES: usize = 20;
+
+/// The rows of a network.
+const NETWORK_ROWS: [&str; 3] = ["srrf-dense", "srrf-skeleton", "srrf"];
 
 /// What [`make`] says while it works.
 pub enum Progress<'a> {
@@ -63,6 +64,8 @@ struct Measured {
 /// Everything that was measured, by part of the report.
 struct Evidence {
     parts: BTreeMap<&'static str, Measured>,
+    /// Networks that were trained otherwise, by name.
+    variants: Vec<(String, Measured)>,
     cast: Cast,
     /// Parts that were wanted and could not be made, and why.
     missing: Vec<(String, String)>,
@@ -93,8 +96,9 @@ pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, E
         let measured = stage.score(experiment.title, &pairs, &cast.methods, experiment.rows, say)?;
         parts.insert(experiment.key, measured);
     }
-    let mut evidence = Evidence { parts, cast, missing: Vec::new(), shapes };
+    let mut evidence = Evidence { parts, variants: Vec::new(), cast, missing: Vec::new(), shapes };
     stage.other_weights(&mut evidence, say)?;
+    stage.variants(&mut evidence, say)?;
     stage.thresholds(&mut evidence, &context, say)?;
     stage.samples(&mut evidence, say)?;
     say(Progress::Line(&format!("{} answers were taken from the cache", cache.reused())));
@@ -165,16 +169,30 @@ impl Stage<'_> {
                 continue;
             };
             let context = MethodContext { weights: Some(weights), device: options.device.clone() };
-            let rows = ["srrf-dense", "srrf-skeleton", "srrf"].map(str::to_owned);
-            let cast = Cast::new(&rows, &context)?;
+            let cast = Cast::new(&NETWORK_ROWS.map(str::to_owned), &context)?;
             let mut protocol = plan::main_protocol(options, self.shapes);
             if key == "table5" {
-                protocol.severities = vec![Severity::ALL[2]];
+                protocol.severities = vec![plan::MIDDLE];
             }
             let measured =
                 self.score(title, &self.pairs(protocol)?, &cast.methods, cast.rows.clone(), say)?;
             evidence.parts.insert(key, measured);
             evidence.cast.weights.extend(cast.weights.into_values().map(|w| (title.to_owned(), w)));
+        }
+        Ok(())
+    }
+
+    /// The networks of `--variant`.
+    fn variants(&self, evidence: &mut Evidence, say: Listener<'_>) -> Result<(), EvalError> {
+        for (name, weights) in &self.options.variant {
+            let context =
+                MethodContext { weights: Some(weights.clone()), device: self.options.device.clone() };
+            let cast = Cast::new(&NETWORK_ROWS.map(str::to_owned), &context)?;
+            let main = plan::main_protocol(self.options, self.shapes);
+            let pairs = self.pairs(Protocol { severities: vec![plan::MIDDLE], ..main })?;
+            let measured = self.score(name, &pairs, &cast.methods, cast.rows.clone(), say)?;
+            evidence.cast.weights.extend(cast.weights.into_values().map(|w| (name.clone(), w)));
+            evidence.variants.push((name.clone(), measured));
         }
         Ok(())
     }

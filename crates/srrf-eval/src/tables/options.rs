@@ -18,7 +18,7 @@ pub struct TablesOptions {
     pub data: Option<PathBuf>,
 
     /// Number of shapes, spread evenly over the data [default: all, or 20 built-in shapes]. All of
-    /// ModelNet40's test split takes days on two cores
+    /// ModelNet40's test split takes half a day on two idle cores
     #[arg(long, value_name = "N")]
     pub shapes: Option<usize>,
 
@@ -44,6 +44,11 @@ pub struct TablesOptions {
     /// srrf-no-ddl, if the program has it]
     #[arg(long, value_name = "PATH")]
     pub no_ddl_weights: Option<PathBuf>,
+
+    /// Networks that were trained otherwise, such as `64 points=FILE`: each is compared with the default
+    /// weights at severity 3. May be given more than once
+    #[arg(long, value_name = "NAME=PATH", value_parser = named_weights)]
+    pub variant: Vec<(String, PathBuf)>,
 
     /// Seed of the pairs: corruptions, poses and order of the points
     #[arg(long, value_name = "S", default_value_t = 1)]
@@ -92,6 +97,14 @@ Examples:
   srrf-eval tables                                    built-in shapes, a first look
   srrf-eval tables --data PATH --shapes 100           100 shapes of the test split
   srrf-eval tables --data PATH --methods icp,oracle,srrf --parts main,beyond";
+
+/// `NAME=PATH`.
+fn named_weights(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, path)) if !name.is_empty() && !path.is_empty() => Ok((name.to_owned(), path.into())),
+        _ => Err("expected a name, `=` and a file of weights or the name of a model".into()),
+    }
+}
 
 impl TablesOptions {
     /// Whether a part is to be made.

@@ -92,7 +92,7 @@ fn seconds(evidence: &Evidence) -> f64 {
         let answers = measured.outcome.records.iter().flat_map(|r| counted.iter().map(|&i| &r.answers[i]));
         answers.filter_map(|a| a.seconds).sum()
     };
-    evidence.parts.values().map(of).sum()
+    evidence.parts.values().chain(evidence.variants.iter().map(|(_, m)| m)).map(of).sum()
 }
 
 fn losses_section(main: &Measured) -> Section {
@@ -226,7 +226,7 @@ fn ablations(evidence: &Evidence) -> Section {
     let mut section = Section::new("ablations", "Ablations");
     section.text.push(
         "Dense branch, skeleton branch and fusion are rows of every table. The number of skeleton points is fixed by \
-         the weights: its ablation needs models trained with other numbers."
+         the weights: its ablation needs networks trained with other numbers (`--variant`)."
             .into(),
     );
     let middle = SeverityKey::One(plan::MIDDLE.get());
@@ -268,6 +268,14 @@ fn ablations(evidence: &Evidence) -> Section {
         let note = "Training knew severities 1 to 5. Beyond, every parameter goes on by its step from 4 to 5; \
                     upsampling, which copies every point at 5, has no more to copy.";
         section.sheets.extend(sheets::compare("beyond", "Beyond the severities of training", note, &columns));
+    }
+    if let (Some(main), false) = (main, evidence.variants.is_empty()) {
+        let mut columns = vec![Column { name: "default", summary: &main.summary, severity: middle }];
+        for (name, measured) in &evidence.variants {
+            columns.push(Column { name, summary: &measured.summary, severity: middle });
+        }
+        let note = "Severity 3, the same pairs.";
+        section.sheets.extend(sheets::compare("variants", "Networks trained otherwise", note, &columns));
     }
     if let Some(mixtures) = evidence.parts.get("mixtures") {
         let columns = [Column { name: "s = 3", summary: &mixtures.summary, severity: middle }];

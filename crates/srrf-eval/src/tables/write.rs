@@ -61,6 +61,8 @@ fn json(document: &Document, evidence: &Evidence) -> Result<String, EvalError> {
     let parts = evidence
         .parts
         .iter()
+        .map(|(part, measured)| (*part, measured))
+        .chain(evidence.variants.iter().map(|(name, measured)| (name.as_str(), measured)))
         .map(|(part, measured)| Part { part, data: &measured.data, summary: &measured.summary })
         .collect();
     let results = Results { facts: &document.facts, parts };
