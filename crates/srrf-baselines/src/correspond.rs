@@ -62,7 +62,7 @@ pub(crate) fn correspond(
 
 /// For each of `a` the nearest of `b`, the lowest index of equals. By looking at all: in 33 dimensions
 /// trees hardly prune, and a plain loop fills the vector units.
-fn nearest_descriptors(a: &[Descriptor], b: &[Descriptor]) -> Vec<u32> {
+pub(crate) fn nearest_descriptors(a: &[Descriptor], b: &[Descriptor]) -> Vec<u32> {
     a.par_iter()
         .with_min_len(64)
         .map(|x| {

@@ -1,5 +1,6 @@
 //! Command line options, and the run that they ask for.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
@@ -8,6 +9,7 @@ use srrf_corrupt::{CorruptionKind, PairConfig, RotationRange, Severity, Variants
 
 use crate::EvalError;
 use crate::TablesOptions;
+use crate::methods::METHODS;
 use crate::synthesized::{CLEAN, Protocol};
 
 /// Shapes scored when `--shapes` is not given.
@@ -56,9 +58,10 @@ pub struct Options {
     #[arg(long, value_name = "NAME", default_value = "flex")]
     pub device: String,
 
-    /// Trained weights: a file, or `srrf-small`, `srrf-small-start` or `srrf-shapes` in the program [default: srrf-small]
+    /// Trained weights of srrf: a file, or `srrf-small`, `srrf-small-start` or `srrf-shapes` in the program [default:
+    /// srrf-small]; or METHOD=PATH for those of a learned baseline. May be given more than once
     #[arg(long, value_name = "PATH")]
-    pub weights: Option<PathBuf>,
+    pub weights: Vec<String>,
 
     /// Worker threads [default: all cores]. Results do not depend on it
     #[arg(long, value_name = "N")]
@@ -215,6 +218,17 @@ impl Options {
         })
     }
 
+    /// `--weights` by method: `METHOD=PATH`, or a path alone for srrf.
+    pub fn weights_by_method(&self) -> BTreeMap<String, PathBuf> {
+        let split = |text: &String| match text.split_once('=') {
+            Some((method, path)) if METHODS.iter().any(|m| m.name == method) => {
+                (method.to_owned(), path.into())
+            }
+            _ => ("srrf".to_owned(), text.into()),
+        };
+        self.weights.iter().map(split).collect()
+    }
+
     /// Number of worker threads.
     ///
     /// # Errors
@@ -282,6 +296,14 @@ mod tests {
         assert!(clean.clean && clean.corruptions.is_empty());
         let clean = parse("--corruptions clean").protocol().unwrap();
         assert!(clean.clean && clean.corruptions.is_empty());
+    }
+
+    #[test]
+    fn weights_belong_to_methods() {
+        let found = parse("--weights a=b.safetensors --weights dcp=c=d").weights_by_method();
+        assert_eq!(found["srrf"], PathBuf::from("a=b.safetensors"), "no method is called a");
+        assert_eq!(found["dcp"], PathBuf::from("c=d"));
+        assert!(parse("").weights_by_method().is_empty());
     }
 
     #[test]

@@ -48,7 +48,7 @@ fn run(options: &Options) -> Result<(), EvalError> {
     if !pairs.has_oracle() {
         selection.drop_oracle(&options.methods)?;
     }
-    let context = MethodContext { weights: options.weights.clone(), device: options.device.clone() };
+    let context = MethodContext { weights: options.weights_by_method(), device: options.device.clone() };
     let methods = selection.set_up(&context)?;
     let weights: BTreeMap<String, String> = methods
         .iter()

@@ -1,11 +1,15 @@
 //! The registry of methods: a new method is one entry in [`METHODS`].
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use srrf_baselines::{Fgr, FpfhRansac, Icp, IcpConfig, IcpPlane, IcpRobust, IcpTrimmed, Identity};
+use srrf_baselines::{
+    DcpConfig, EquiGsprConfig, Fgr, FpfhRansac, Icp, IcpConfig, IcpPlane, IcpRobust, IcpTrimmed, Identity,
+    LearnedConfig, LearnedRegister, PanetConfig, PointNetLkConfig, RgmConfig,
+};
 use srrf_cloud::Register;
-use srrf_model::weights::LoadedModel;
-use srrf_model::{SrrfRegister, embedded, weights};
+use srrf_model::weights::{self, LoadedModel};
+use srrf_model::{NetworkConfig, SrrfRegister, embedded};
 use srrf_refine::{RefineConfig, Refined};
 
 use crate::EvalError;
@@ -18,11 +22,19 @@ pub const ORACLE: &str = "oracle";
 /// What the entries of the registry may need to set up a method.
 #[derive(Debug, Clone, Default)]
 pub struct MethodContext {
-    /// `--weights`: a file of trained weights, or the name of a model in the program; `None` for its
-    /// default.
-    pub weights: Option<PathBuf>,
+    /// `--weights`, by method: a file of trained weights, or the name of a model in the program; the
+    /// method's default where there is none.
+    pub weights: BTreeMap<String, PathBuf>,
     /// `--device`: where tensors live, such as `flex`.
     pub device: String,
+}
+
+impl MethodContext {
+    /// The context in which srrf has these weights, or its default, and every other method its default.
+    pub fn of_srrf(weights: Option<PathBuf>, device: &str) -> Self {
+        let weights = weights.map(|path| ("srrf".to_owned(), path)).into_iter().collect();
+        Self { weights, device: device.to_owned() }
+    }
 }
 
 /// A method ready to run.
@@ -68,6 +80,11 @@ pub const METHODS: &[MethodEntry] = &[
     optional("icp-robust", &["icp-robust"], |_| Ok(plain(IcpRobust::default()))),
     optional("fpfh-ransac", &["fpfh-ransac"], |_| Ok(plain(FpfhRansac::default()))),
     optional("fgr", &["fgr"], |_| Ok(plain(Fgr::default()))),
+    optional("pointnetlk", &["pointnetlk"], learned::<PointNetLkConfig>),
+    optional("dcp", &["dcp"], learned::<DcpConfig>),
+    optional("rgm", &["rgm"], learned::<RgmConfig>),
+    optional("panet", &["panet"], learned::<PanetConfig>),
+    optional("equi-gspr", &["equi-gspr"], learned::<EquiGsprConfig>),
     MethodEntry {
         name: "srrf",
         rows: &["srrf-dense", "srrf-skeleton", "srrf"],
@@ -96,6 +113,31 @@ fn plain(register: impl Register + 'static) -> Method {
     Method { register: Box::new(register), weights: None, settings: String::new(), parallel_inside: false }
 }
 
+/// A learned baseline, with the weights of `--weights NAME=PATH` or those in the program.
+fn learned<C: LearnedConfig + 'static>(context: &MethodContext) -> Result<Method, String> {
+    let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
+    let name = C::NAME;
+    let (loaded, origin) = match (context.weights.get(name), srrf_baselines::embedded(name)) {
+        (Some(path), _) => (weights::read::<C>(path, &device), path.display().to_string()),
+        (None, Some(bytes)) => (weights::parse(bytes, name, &device), "in the program".to_owned()),
+        (None, None) => {
+            return Err(format!(
+                "no weights of it are in the program; train some by `cargo run -p srrf-train -- --config \
+                 configs/baselines/{name}.toml --data PATH`, then give `--weights {name}=runs/{name}/best.safetensors`"
+            ));
+        }
+    };
+    let loaded = loaded.map_err(|e| e.to_string())?;
+    let weights = describe(&loaded, &origin);
+    Ok(Method { weights: Some(weights), ..plain(LearnedRegister::new(loaded, device)) })
+}
+
+/// Which weights they are, for reports.
+fn describe<C: NetworkConfig>(loaded: &LoadedModel<C>, origin: &str) -> String {
+    let data = loaded.metadata.get("data").map_or("unknown data", String::as_str);
+    format!("{} ({origin}, sha256 {}), trained on {data}", loaded.name, &loaded.sha256[..16])
+}
+
 /// The network, with the weights of `--weights` or those in the program.
 fn srrf(context: &MethodContext) -> Result<(SrrfRegister, String), String> {
     let (loaded, weights) = network(context)?;
@@ -106,7 +148,7 @@ fn srrf(context: &MethodContext) -> Result<(SrrfRegister, String), String> {
 /// The network of `--weights`, or the one in the program, and where it comes from, in words.
 pub(crate) fn network(context: &MethodContext) -> Result<(LoadedModel, String), String> {
     let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
-    let (loaded, origin) = match &context.weights {
+    let (loaded, origin) = match context.weights.get("srrf") {
         Some(path) => match path.to_str().and_then(|name| embedded::load(name, &device)) {
             Some(loaded) => (loaded, "in the program".to_owned()),
             None => (weights::load(path, &device), path.display().to_string()),
@@ -114,8 +156,7 @@ pub(crate) fn network(context: &MethodContext) -> Result<(LoadedModel, String), 
         None => (embedded::load_default(&device), "in the program".to_owned()),
     };
     let loaded = loaded.map_err(|e| e.to_string())?;
-    let data = loaded.metadata.get("data").map_or("unknown data", String::as_str);
-    let weights = format!("{} ({origin}, sha256 {}), trained on {data}", loaded.name, &loaded.sha256[..16]);
+    let weights = describe(&loaded, &origin);
     Ok((loaded, weights))
 }
 
@@ -216,9 +257,16 @@ mod tests {
 
     #[test]
     fn names_agree_with_the_methods() {
-        let context = MethodContext { weights: None, device: "flex".into() };
+        let context = MethodContext::of_srrf(None, "flex");
         for entry in METHODS {
-            let method = (entry.build)(&context).unwrap();
+            let method = match (entry.build)(&context) {
+                Ok(method) => method,
+                Err(why) => {
+                    let training = format!("--config configs/baselines/{}.toml", entry.name);
+                    assert!(why.contains(&training), "{why}");
+                    continue;
+                }
+            };
             assert_eq!(method.register.name(), entry.name);
             assert_eq!(entry.rows.last(), Some(&entry.name));
         }

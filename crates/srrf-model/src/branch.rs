@@ -6,7 +6,7 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::confidence::Confidence;
-use crate::geometry::{HostClouds, even_subsample, flat_indices, rows};
+use crate::geometry::even_tokens;
 use crate::integration::BranchPose;
 use crate::matching::SoftMatching;
 use crate::pfi::{Pfi, PfiConfig};
@@ -96,7 +96,7 @@ impl Branch {
     pub fn forward(&self, source: Tensor<3>, target: Tensor<3>, phase: f32) -> BranchOutput {
         let [batch, _, _] = source.dims();
         let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
-        let tokens = self.choose_tokens(clouds.clone(), phase); // [2 batch, n, 3]
+        let tokens = even_tokens(clouds.clone(), self.tokens, phase); // [2 batch, n, 3]
         let features = self.sfe.forward(tokens.clone(), clouds); // F
         let features = self.pfi.forward(features, tokens.clone()); // Phi
         let half = |x: &Tensor<3>, which: usize| x.clone().narrow(0, which * batch, batch);
@@ -115,15 +115,5 @@ impl Branch {
             matches: matches.points,
             probabilities: matches.probabilities,
         }
-    }
-
-    fn choose_tokens(&self, clouds: Tensor<3>, phase: f32) -> Tensor<3> {
-        let [batch, points, _] = clouds.dims();
-        if self.tokens == 0 || self.tokens >= points {
-            return clouds;
-        }
-        let host = HostClouds::read(&clouds);
-        let chosen = flat_indices(host.iter(), points, |_, cloud| even_subsample(cloud, self.tokens, phase));
-        rows(clouds.reshape([batch * points, 3]), &chosen).reshape([batch, self.tokens, 3])
     }
 }

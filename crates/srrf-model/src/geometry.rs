@@ -278,6 +278,18 @@ pub fn even_subsample(points: &[[f32; 3]], count: usize, phase: f32) -> Vec<u32>
     (0..count).map(|i| chosen[i % taken]).collect()
 }
 
+/// [`even_subsample`] of each cloud: `[batch, tokens, 3]` of `[batch, points, 3]`; all points where
+/// `tokens` is 0 or not below their number.
+pub fn even_tokens(clouds: Tensor<3>, tokens: usize, phase: f32) -> Tensor<3> {
+    let [batch, points, _] = clouds.dims();
+    if tokens == 0 || tokens >= points {
+        return clouds;
+    }
+    let host = HostClouds::read(&clouds);
+    let chosen = flat_indices(host.iter(), points, |_, cloud| even_subsample(cloud, tokens, phase));
+    rows(clouds.reshape([batch * points, 3]), &chosen).reshape([batch, tokens, 3])
+}
+
 /// Interleaves the low 10 bits of three numbers.
 fn morton(x: u32, y: u32, z: u32) -> u32 {
     let spread = |v: u32| {

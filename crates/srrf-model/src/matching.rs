@@ -42,8 +42,15 @@ impl SoftMatching {
     ) -> SoftMatches {
         let [_, _, width] = source_features.dims();
         let sharpness = self.log_sharpness.val().exp().unsqueeze::<3>() / (width as f64).sqrt();
-        let scores = (source_features * sharpness).matmul(target_features.transpose());
-        let probabilities = softmax(scores, 2);
-        SoftMatches { points: probabilities.clone().matmul(target_points), probabilities }
+        soft_matches((source_features * sharpness).matmul(target_features.transpose()), target_points)
     }
+}
+
+/// `m = softmax(scores)` over the target points, and `yhat = m Y`.
+///
+/// # Shapes
+/// - `scores`: `[batch, n, m]`, `target_points`: `[batch, m, 3]`
+pub fn soft_matches(scores: Tensor<3>, target_points: Tensor<3>) -> SoftMatches {
+    let probabilities = softmax(scores, 2);
+    SoftMatches { points: probabilities.clone().matmul(target_points), probabilities }
 }

@@ -124,7 +124,10 @@ fn cloud_points(points: &Tensor<3>) -> Vec<Vec<[f64; 3]>> {
 }
 
 /// `points` points of the cloud, evenly along a space-filling curve.
-fn subsample(cloud: &PointCloud, points: usize) -> Result<PointCloud, RegisterError> {
+///
+/// # Errors
+/// [`RegisterError::Source`] if `points` are too few for a cloud.
+pub fn subsample(cloud: &PointCloud, points: usize) -> Result<PointCloud, RegisterError> {
     if cloud.len() <= points {
         return Ok(cloud.clone());
     }

@@ -1,8 +1,45 @@
 //! The sizes with which a network can be built.
 
+use std::fmt::Debug;
+
+use burn::module::Module;
+use burn::tensor::Device;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
 use crate::branch::BranchConfig;
 use crate::sem::SemConfig;
-use crate::srrf::SrrfConfig;
+use crate::srrf::{Srrf, SrrfConfig};
+
+/// The sizes of a network: what it is built from, and what stands beside its weights.
+pub trait NetworkConfig: Clone + Debug + PartialEq + Serialize + DeserializeOwned + Send + Sync {
+    /// The network.
+    type Network: Module + Send + Sync;
+    /// Key of the sizes in the header of a weights file.
+    const KEY: &'static str;
+
+    /// Checks that [`NetworkConfig::init`] and the forward pass can work with these sizes.
+    ///
+    /// # Errors
+    /// [`WrongSize`] for the first one that cannot be.
+    fn check(&self) -> Result<(), WrongSize>;
+
+    /// A new network; see [`crate::init::seeded`] for weights that do not depend on the backend.
+    fn init(&self, device: &Device) -> Self::Network;
+}
+
+impl NetworkConfig for SrrfConfig {
+    type Network = Srrf;
+    const KEY: &'static str = "srrf_config";
+
+    fn check(&self) -> Result<(), WrongSize> {
+        self.check()
+    }
+
+    fn init(&self, device: &Device) -> Srrf {
+        self.init(device)
+    }
+}
 
 /// A size with which the network cannot be built.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -12,6 +49,13 @@ pub struct WrongSize {
     pub key: String,
     /// What it must be.
     pub why: String,
+}
+
+impl WrongSize {
+    /// The error for the value at `key`.
+    pub fn new(key: impl Into<String>, why: impl Into<String>) -> Self {
+        Self { key: key.into(), why: why.into() }
+    }
 }
 
 impl SrrfConfig {

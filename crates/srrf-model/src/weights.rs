@@ -10,10 +10,9 @@ use half::f16;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
 
-use crate::srrf::{Srrf, SrrfConfig};
+use crate::sizes::NetworkConfig;
+use crate::srrf::SrrfConfig;
 
-/// Header key of the network's sizes, as JSON.
-const CONFIG_KEY: &str = "srrf_config";
 /// Header key of the model's name.
 const NAME_KEY: &str = "name";
 
@@ -40,11 +39,14 @@ pub enum WeightsError {
     },
     /// The header does not describe a network of this program.
     #[error(
-        "{origin}: no network description under `srrf_config` in the header: {why}; was it written by srrf-train?"
+        "{origin}: no network description under `{key}` in the header: {why}; was it written by srrf-train, for \
+         this method?"
     )]
     Header {
         /// Where the bytes came from.
         origin: String,
+        /// The entry that was looked for.
+        key: &'static str,
         /// What is wrong.
         why: String,
     },
@@ -62,11 +64,11 @@ pub enum WeightsError {
 
 /// A network with what its file says about it.
 #[derive(Debug)]
-pub struct LoadedModel {
+pub struct LoadedModel<C: NetworkConfig = SrrfConfig> {
     /// The network, on the device, without gradients.
-    pub model: Srrf,
+    pub model: C::Network,
     /// Its sizes.
-    pub config: SrrfConfig,
+    pub config: C,
     /// Name of the model, such as `srrf-small`.
     pub name: String,
     /// SHA-256 of the file, in hexadecimal.
@@ -163,9 +165,9 @@ impl ModuleMapper for Applier {
 ///
 /// # Errors
 /// [`WeightsError::Format`] or [`WeightsError::Header`] if the header cannot be written.
-pub fn to_safetensors(
-    model: &Srrf,
-    config: &SrrfConfig,
+pub fn to_safetensors<C: NetworkConfig>(
+    model: &C::Network,
+    config: &C,
     name: &str,
     notes: &BTreeMap<String, String>,
 ) -> Result<Vec<u8>, WeightsError> {
@@ -181,30 +183,49 @@ pub fn to_safetensors(
         .map(|(path, shape, bytes)| Ok((path.as_str(), TensorView::new(Dtype::F16, shape.clone(), bytes)?)))
         .collect::<Result<Vec<_>, _>>()
         .map_err(|source| WeightsError::Format { origin: origin(), source })?;
-    let config = serde_json::to_string(config)
-        .map_err(|why| WeightsError::Header { origin: origin(), why: why.to_string() })?;
+    let config = serde_json::to_string(config).map_err(|why| WeightsError::Header {
+        origin: origin(),
+        key: C::KEY,
+        why: why.to_string(),
+    })?;
     let mut header: HashMap<String, String> = notes.iter().map(|(k, v)| (k.clone(), v.clone())).collect();
-    header.insert(CONFIG_KEY.into(), config);
+    header.insert(C::KEY.into(), config);
     header.insert(NAME_KEY.into(), name.into());
     safetensors::serialize(views, Some(header))
         .map_err(|source| WeightsError::Format { origin: origin(), source })
 }
 
-/// Reads a network from the bytes of a safetensors file; `origin` names them in errors.
+/// Reads an SRRF network from the bytes of a safetensors file; `origin` names them in errors.
 ///
 /// # Errors
 /// [`WeightsError`] for broken files and for weights of another architecture.
 pub fn from_safetensors(bytes: &[u8], origin: &str, device: &Device) -> Result<LoadedModel, WeightsError> {
+    parse::<SrrfConfig>(bytes, origin, device)
+}
+
+/// Reads a network of any method from the bytes of a safetensors file; `origin` names them in errors.
+///
+/// # Errors
+/// As [`from_safetensors`].
+pub fn parse<C: NetworkConfig>(
+    bytes: &[u8],
+    origin: &str,
+    device: &Device,
+) -> Result<LoadedModel<C>, WeightsError> {
     let origin = origin.to_string();
     let format = |source| WeightsError::Format { origin: origin.clone(), source };
     let (_, header) = SafeTensors::read_metadata(bytes).map_err(format)?;
     let metadata = header.metadata().clone().unwrap_or_default();
-    let config: SrrfConfig = match metadata.get(CONFIG_KEY) {
+    let config: C = match metadata.get(C::KEY) {
         Some(json) => serde_json::from_str(json).map_err(|e| e.to_string()),
         None => Err("the entry is missing".to_string()),
     }
-    .map_err(|why| WeightsError::Header { origin: origin.clone(), why })?;
-    config.check().map_err(|e| WeightsError::Header { origin: origin.clone(), why: e.to_string() })?;
+    .map_err(|why| WeightsError::Header { origin: origin.clone(), key: C::KEY, why })?;
+    config.check().map_err(|e| WeightsError::Header {
+        origin: origin.clone(),
+        key: C::KEY,
+        why: e.to_string(),
+    })?;
 
     let mut values = BTreeMap::new();
     for (name, view) in SafeTensors::deserialize(bytes).map_err(format)?.tensors() {
@@ -229,13 +250,21 @@ pub fn from_safetensors(bytes: &[u8], origin: &str, device: &Device) -> Result<L
     Ok(LoadedModel { model, config, name, sha256, metadata })
 }
 
-/// Reads a network from a safetensors file.
+/// Reads an SRRF network from a safetensors file.
 ///
 /// # Errors
 /// As [`from_safetensors`], and [`WeightsError::Io`].
 pub fn load(path: &Path, device: &Device) -> Result<LoadedModel, WeightsError> {
+    read::<SrrfConfig>(path, device)
+}
+
+/// Reads a network of any method from a safetensors file.
+///
+/// # Errors
+/// As [`load`].
+pub fn read<C: NetworkConfig>(path: &Path, device: &Device) -> Result<LoadedModel<C>, WeightsError> {
     let bytes = std::fs::read(path).map_err(|source| WeightsError::Io { path: path.into(), source })?;
-    from_safetensors(&bytes, &path.display().to_string(), device)
+    parse(&bytes, &path.display().to_string(), device)
 }
 
 /// Writes `bytes` to `path`, whole or not at all.

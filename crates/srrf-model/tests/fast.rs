@@ -146,6 +146,21 @@ fn residual_and_layer_norm() {
 }
 
 #[test]
+fn group_norm_and_relu() {
+    // 3 clouds of 7 rows, 5 groups of 3 channels.
+    let inputs = [input(12, [3 * 7, 15]), input(13, [1, 15]), input(14, [1, 15])];
+    let flat = |t: &Tensor<2>| t.clone().reshape([15]);
+    let ours = |t: &[Tensor<2>]| fast::group_norm_relu(t[0].clone(), flat(&t[1]), flat(&t[2]), 3, 5);
+    let wanted = |t: &[Tensor<2>]| composed::group_norm_relu(t[0].clone(), flat(&t[1]), flat(&t[2]), 3, 5);
+    let (ours, wanted) = (run(&inputs, DType::F32, &ours), run(&inputs, DType::F64, &wanted));
+    assert_close("group norm", &ours.0, &wanted.0, EXACT);
+    assert!(ours.0.contains(&0.0) && ours.0.iter().any(|&v| v > 0.5));
+    for (a, b) in ours.1.iter().zip(&wanted.1) {
+        assert_close("gradient of group norm", a, b, EXACT);
+    }
+}
+
+#[test]
 fn gathering_neighbours() {
     let neighbours: Vec<i64> = (0..9 * 4).map(|i| (i * i + 3 * i) % 17).collect();
     let inputs = [input(10, [17, 5]), input(11, [9, 5])];
@@ -175,6 +190,8 @@ fn numbers_that_are_not_finite_come_through() {
     assert!(has_nan(fast::gather_max(bad(), &[0, 1], 2)));
     assert!(has_nan(fast::gather_relu(bad(), Tensor::zeros([1, 2], &device), &[0, 1])));
     assert!(has_nan(fast::attention(bad(), Tensor::ones([2, 4], &device), 1, 1)));
+    let ones = || Tensor::ones([2], &device);
+    assert!(has_nan(fast::group_norm_relu(bad(), ones(), ones(), 1, 2)));
     let norm = LayerNormConfig::new(2).init(&device);
     assert!(has_nan(fast::add_norm(&norm, bad(), Tensor::ones([2, 2], &device))));
 }

@@ -95,7 +95,7 @@ mod network {
 
     fn bench() -> Bench {
         let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/modelnet-small.toml"));
-        let config = TrainConfig::read(path).expect("the configuration of the repository").network;
+        let config = <TrainConfig>::read(path).expect("the configuration of the repository").network;
         let device = Device::flex();
         let model = init::seeded(config.init(&device), 1).valid();
         let pair = pair();

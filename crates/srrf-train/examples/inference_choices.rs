@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let [config, weights_path, data] = arguments.as_slice() else {
         return Err("usage: inference_choices CONFIG WEIGHTS DATA".into());
     };
-    let config = TrainConfig::read(Path::new(config))?;
+    let config = <TrainConfig>::read(Path::new(config))?;
     let pairs = TrainingPairs::new(&config, open(Path::new(data), Split::Train)?)?;
     let held_out: Vec<Pair> = pairs.validation(Severity::try_from(3)?)?;
     let workers = Workers::new(std::thread::available_parallelism().map_or(1, usize::from))?;

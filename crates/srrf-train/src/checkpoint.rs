@@ -9,10 +9,11 @@ use burn::optim::ModuleOptimizer;
 use burn::tensor::{Bytes, Device};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
+use srrf_model::init;
 use srrf_model::weights::{WeightsError, parameters, with_parameters, write_atomically};
-use srrf_model::{Srrf, init};
 
 use crate::config::TrainConfig;
+use crate::network::Trained;
 
 /// Name of the checkpoint in the run's folder.
 pub const FILE: &str = "checkpoint.safetensors";
@@ -73,10 +74,10 @@ pub struct Progress {
 ///
 /// # Errors
 /// [`CheckpointError::Write`]; the old checkpoint is then unharmed.
-pub fn save(
+pub fn save<C: Trained>(
     folder: &Path,
-    config: &TrainConfig,
-    model: &Srrf,
+    config: &TrainConfig<C>,
+    model: &C::Network,
     optimizer: &ModuleOptimizer,
     progress: &Progress,
 ) -> Result<(), CheckpointError> {
@@ -112,12 +113,12 @@ pub fn save(
 ///
 /// # Errors
 /// [`CheckpointError`] for broken files and for checkpoints of another configuration.
-pub fn load(
+pub fn load<C: Trained>(
     folder: &Path,
-    config: &TrainConfig,
+    config: &TrainConfig<C>,
     optimizer: ModuleOptimizer,
     device: &Device,
-) -> Result<Option<(Srrf, ModuleOptimizer, Progress)>, CheckpointError> {
+) -> Result<Option<(C::Network, ModuleOptimizer, Progress)>, CheckpointError> {
     let path = folder.join(FILE);
     let bytes = match std::fs::read(&path) {
         Ok(bytes) => bytes,

@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 use srrf_corrupt::{CorruptionKind, PairConfig};
 use srrf_model::{SkeletonLossConfig, SrrfConfig};
 
+use crate::network::Trained;
+
 /// Why a configuration cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
@@ -40,10 +42,13 @@ pub enum ConfigError {
     },
 }
 
-/// A training run.
+/// A training run of the network of sizes `C`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TrainConfig {
+#[serde(deny_unknown_fields, bound = "")]
+pub struct TrainConfig<C: Trained = SrrfConfig> {
+    /// What is trained: `srrf` if not given, or a learned baseline, see `configs/baselines/`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method: Option<String>,
     /// Name of the model and of its folder under `runs/`.
     pub name: String,
     /// Seed of the initial weights and of every draw.
@@ -64,9 +69,9 @@ pub struct TrainConfig {
     #[serde(default)]
     pub pairs: PairConfig,
     /// Sizes of the network.
-    pub network: SrrfConfig,
+    pub network: C,
     /// Weights of the losses.
-    pub losses: LossConfig,
+    pub losses: C::LossConfig,
     /// Optimiser and batches.
     pub optimizer: OptimizerConfig,
     /// The stages, one after the other.
@@ -166,7 +171,7 @@ pub struct LossConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OptimizerConfig {
-    /// `adam` (weight decay added to the gradient, as PyTorch's Adam) or `adamw` (decoupled).
+    /// `adam` (weight decay added to the gradient, as PyTorch's Adam), `adamw` (decoupled) or `sgd`.
     pub kind: OptimizerKind,
     /// Pairs a step. The paper's schedule is DCP's, which uses 32.
     pub batch: usize,
@@ -175,8 +180,11 @@ pub struct OptimizerConfig {
     pub shard: usize,
     /// Weight decay. DCP: 1e-4.
     pub weight_decay: f64,
-    /// Second moment's decay. Adam: 0.999.
+    /// Second moment's decay. Adam: 0.999. Unused by `sgd`.
     pub beta_2: f64,
+    /// Momentum of `sgd`; none if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub momentum: Option<f64>,
     /// The gradient is scaled down to this norm; 0 for never.
     pub clip_norm: f64,
 }
@@ -189,6 +197,8 @@ pub enum OptimizerKind {
     Adam,
     /// Adam with decoupled weight decay.
     Adamw,
+    /// Stochastic gradient descent with momentum.
+    Sgd,
 }
 
 /// What a stage does to the skeleton module.
@@ -212,13 +222,23 @@ pub struct StageConfig {
     /// Length in passes over the training shapes, one pair a shape; may be a fraction.
     pub epochs: f64,
     /// What happens to the skeleton module.
+    #[serde(default = "frozen")]
     pub sem: SemTraining,
-    /// Whether the two registration branches are trained.
+    /// Whether the registration is trained: the two branches of SRRF, the whole of a baseline.
+    #[serde(default = "yes")]
     pub registration: bool,
     /// Learning rate at the start (after warm-up).
     pub learning_rate: f64,
     /// How it falls.
     pub schedule: Schedule,
+}
+
+fn frozen() -> SemTraining {
+    SemTraining::Frozen
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// How the learning rate falls within a stage.
@@ -262,7 +282,23 @@ impl Default for KeepConfig {
     }
 }
 
-impl TrainConfig {
+/// The `method` of a configuration file, `srrf` if it names none.
+///
+/// # Errors
+/// [`ConfigError`] when the file cannot be read, is no TOML, or the method is no text.
+pub fn method_of(path: &Path) -> Result<String, ConfigError> {
+    #[derive(Deserialize)]
+    struct Method {
+        method: Option<String>,
+    }
+    let text =
+        std::fs::read_to_string(path).map_err(|source| ConfigError::Read { path: path.into(), source })?;
+    let found: Method = toml::from_str(&text)
+        .map_err(|source| ConfigError::Parse { path: path.into(), source: Box::new(source) })?;
+    Ok(found.method.unwrap_or_else(|| SrrfConfig::METHOD.to_string()))
+}
+
+impl<C: Trained> TrainConfig<C> {
     /// Reads and checks a file.
     ///
     /// # Errors
@@ -281,6 +317,9 @@ impl TrainConfig {
     /// The first value out of its range, with what it must be.
     fn wrong_value(&self) -> Option<(String, String)> {
         let wrong = |key: &str, why: &str| Some((key.to_string(), why.to_string()));
+        if self.method.as_deref().unwrap_or(SrrfConfig::METHOD) != C::METHOD {
+            return wrong("method", "is another than the one that reads this");
+        }
         if self.name.is_empty() || self.name.contains(['/', '\\']) {
             return wrong("name", "must be a file name");
         }
@@ -326,11 +365,8 @@ impl TrainConfig {
             if stage.learning_rate.is_nan() || stage.learning_rate <= 0.0 {
                 return wrong(&key("learning_rate"), "must be more than 0");
             }
-            if stage.sem == SemTraining::Frozen && !stage.registration {
-                return wrong(
-                    &key("registration"),
-                    "must be true where sem is frozen, or the stage trains nothing",
-                );
+            if let Some((field, why)) = C::wrong_stage(stage) {
+                return wrong(&key(field), why);
             }
         }
         if self.data.source == DataSource::Shapes && self.seed == srrf_eval::data::TEST_SHAPES_SEED {

@@ -15,6 +15,7 @@ use srrf_corrupt::{
 };
 
 use crate::config::{DrawConfig, TrainConfig};
+use crate::network::Trained;
 
 /// Stream of a generator: keeps the draws of training, validation and shuffling apart.
 #[derive(Clone, Copy)]
@@ -54,7 +55,7 @@ impl TrainingPairs {
     ///
     /// # Errors
     /// [`PairError`] when the built-in shapes that `data.built_in` asks for cannot be made.
-    pub fn new(config: &TrainConfig, shapes: Box<dyn ShapeSource>) -> Result<Self, PairError> {
+    pub fn new<C: Trained>(config: &TrainConfig<C>, shapes: Box<dyn ShapeSource>) -> Result<Self, PairError> {
         let (count, held_out) = (shapes.len(), config.data.validation.min(shapes.len() / 2).max(1));
         let stride = count as f64 / held_out as f64;
         let validation: Vec<usize> = (0..held_out).map(|i| ((i as f64 + 0.5) * stride) as usize).collect();

@@ -1,11 +1,16 @@
-//! Trains the SRRF network: configuration, pairs, schedule, checkpoints, the loop.
+//! Trains the SRRF network and the learned baselines: configuration, pairs, schedule, checkpoints, the
+//! loop. [`network`] is the seam between the loop and what it trains.
 
+pub mod baseline;
 pub mod checkpoint;
 pub mod config;
 pub mod data;
 pub mod log;
+pub mod network;
+pub mod optimizer;
 pub mod resources;
 pub mod run;
 pub mod schedule;
+mod srrf;
 pub mod step;
 pub mod validate;

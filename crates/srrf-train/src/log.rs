@@ -76,16 +76,18 @@ impl Log {
                 )
             })
             .collect();
-        let line = json!({ "kind": "validation", "step": step, "epoch": round(epoch), "scores": rows,
-            "skeleton_chamfer": result.skeleton_chamfer, "skeleton_spread": result.skeleton_spread });
+        let mut line = json!({ "kind": "validation", "step": step, "epoch": round(epoch), "scores": rows });
+        for (name, value) in &result.notes {
+            line[*name] = json!(value);
+        }
         writeln!(self.file, "{line}")
     }
 
-    /// Draws the curves of the log as `curve.svg` beside it.
+    /// Draws the curves of the log as `curve.svg` beside it: RMSE(R) of `rows` and the `losses`.
     ///
     /// # Errors
     /// A message, when the picture cannot be drawn.
-    pub fn draw(&self) -> Result<(), String> {
+    pub fn draw(&self, rows: &[&'static str], losses: &[&'static str]) -> Result<(), String> {
         let text = std::fs::read_to_string(&self.path).map_err(|e| e.to_string())?;
         let lines: Vec<Value> = text.lines().filter_map(|l| serde_json::from_str(l).ok()).collect();
         let curve = |kind: &str, value: &dyn Fn(&Value) -> Option<f64>| -> Vec<(f64, f64)> {
@@ -93,11 +95,9 @@ impl Log {
             of_kind.filter_map(|l| Some((l["epoch"].as_f64()?, value(l)?))).collect()
         };
         let score = |name: &'static str| curve("validation", &move |l| l["scores"][name]["rmse_r"].as_f64());
-        let validation =
-            [("dense", score("dense")), ("skeleton", score("skeleton")), ("fused", score("fused"))];
+        let validation: Vec<_> = rows.iter().map(|&row| (row, score(row))).collect();
         let loss = |name: &'static str| curve("train", &move |l| l["losses"][name].as_f64());
-        let losses =
-            ["sem", "chamfer", "dense_correspondence", "skeleton_correspondence"].map(|n| (n, loss(n)));
+        let losses: Vec<_> = losses.iter().map(|&name| (name, loss(name))).collect();
 
         let picture = self.path.with_file_name("curve.svg");
         let root = SVGBackend::new(&picture, (900, 640)).into_drawing_area();

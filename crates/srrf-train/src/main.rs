@@ -1,4 +1,4 @@
-//! `srrf-train --config configs/modelnet.toml`: trains the SRRF network.
+//! `srrf-train --config configs/modelnet.toml`: trains the SRRF network, or a learned baseline.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -7,13 +7,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use clap::Parser;
+use srrf_baselines::{DcpConfig, EquiGsprConfig, PanetConfig, PointNetLkConfig, RgmConfig};
 use srrf_cloud::shapes::ProceduralShapes;
 use srrf_cloud::source::{ACCEPTED_LAYOUTS, ShapeSource, Split, open};
-use srrf_model::keep_freed_memory;
-use srrf_train::config::{DataSource, TrainConfig};
+use srrf_model::{SrrfConfig, keep_freed_memory};
+use srrf_train::baseline::Baseline;
+use srrf_train::config::{DataSource, TrainConfig, method_of};
+use srrf_train::network::Trained;
 use srrf_train::run::{Existing, RunError, RunOptions, run};
 
-/// Trains the SRRF network.
+/// Trains the SRRF network, or the learned baseline that the configuration names as its `method`.
 ///
 /// Writes into the run's folder: the resolved config.toml, metrics.jsonl, curve.svg, a checkpoint,
 /// and the weights `best.safetensors` (by validation) and `last.safetensors`.
@@ -55,7 +58,7 @@ struct Failure(u8, String);
 
 fn main() -> ExitCode {
     keep_freed_memory();
-    match train(Arguments::parse()) {
+    match start(Arguments::parse()) {
         Ok(code) => code,
         Err(Failure(code, message)) => {
             tell(&format!("error: {message}"));
@@ -69,9 +72,29 @@ fn tell(message: &str) {
     eprintln!("{message}");
 }
 
-fn train(arguments: Arguments) -> Result<ExitCode, Failure> {
+/// Trains what the configuration names.
+fn start(arguments: Arguments) -> Result<ExitCode, Failure> {
+    let method = method_of(&arguments.config).map_err(|e| Failure(2, e.to_string()))?;
+    match method.as_str() {
+        SrrfConfig::METHOD => train::<SrrfConfig>(arguments),
+        Baseline::<DcpConfig>::METHOD => train::<Baseline<DcpConfig>>(arguments),
+        Baseline::<PointNetLkConfig>::METHOD => train::<Baseline<PointNetLkConfig>>(arguments),
+        Baseline::<PanetConfig>::METHOD => train::<Baseline<PanetConfig>>(arguments),
+        Baseline::<RgmConfig>::METHOD => train::<Baseline<RgmConfig>>(arguments),
+        Baseline::<EquiGsprConfig>::METHOD => train::<Baseline<EquiGsprConfig>>(arguments),
+        _ => Err(Failure(
+            2,
+            format!(
+                "{}: `method` is \"{method}\"; choose from srrf, dcp, pointnetlk, panet, rgm, equi-gspr",
+                arguments.config.display()
+            ),
+        )),
+    }
+}
+
+fn train<C: Trained>(arguments: Arguments) -> Result<ExitCode, Failure> {
     let usage = |e: &dyn std::fmt::Display| Failure(2, e.to_string());
-    let mut config = TrainConfig::read(&arguments.config).map_err(|e| usage(&e))?;
+    let mut config = TrainConfig::<C>::read(&arguments.config).map_err(|e| usage(&e))?;
     let name = arguments.device.or(config.device.take()).unwrap_or_else(|| "flex".into());
     let device = srrf_model::device(&name).map_err(|e| usage(&e))?;
     config.device = Some(name.clone());
@@ -116,7 +139,7 @@ fn cores() -> usize {
 }
 
 /// The shapes that the configuration asks for.
-fn shapes(config: &TrainConfig, data: Option<&Path>) -> Result<Box<dyn ShapeSource>, String> {
+fn shapes<C: Trained>(config: &TrainConfig<C>, data: Option<&Path>) -> Result<Box<dyn ShapeSource>, String> {
     const WITHOUT: &str = "to train without a download: srrf-train --config configs/shapes.toml";
     match (config.data.source, data.or(config.data.path.as_deref())) {
         (DataSource::Shapes, _) => match ProceduralShapes::new(config.seed, config.data.shapes, None) {

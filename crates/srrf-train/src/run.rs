@@ -6,20 +6,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use burn::module::Module;
-use burn::optim::decay::WeightDecayConfig;
-use burn::optim::{AdamConfig, AdamWConfig, ModuleOptimizer};
+use burn::optim::ModuleOptimizer;
 use burn::tensor::Device;
 use srrf_cloud::source::ShapeSource;
 use srrf_corrupt::{Pair, Severity};
-use srrf_model::weights::{
-    load as load_weights, parameters, to_safetensors, with_parameters, write_atomically,
-};
-use srrf_model::{Srrf, embedded, init};
+use srrf_model::init;
+use srrf_model::weights::{parameters, to_safetensors, with_parameters, write_atomically};
 
 use crate::checkpoint::{self, CheckpointError, Progress};
-use crate::config::{DataSource, OptimizerConfig, OptimizerKind, TrainConfig};
+use crate::config::{DataSource, TrainConfig};
 use crate::data::TrainingPairs;
 use crate::log::{Log, progress_bar};
+use crate::network::Trained;
+use crate::optimizer::optimizer;
 use crate::resources::cpu_seconds;
 use crate::schedule::Plan;
 use crate::step::{Losses, StepContext, StepError, Workers, gradient, scale};
@@ -128,30 +127,16 @@ pub struct Ended {
     pub best: Option<PathBuf>,
 }
 
-/// The optimiser of a configuration.
-pub fn optimizer(config: &OptimizerConfig) -> ModuleOptimizer {
-    let (beta_2, decay) = (config.beta_2 as f32, config.weight_decay as f32);
-    match config.kind {
-        OptimizerKind::Adam => {
-            let adam = AdamConfig::new().with_beta_2(beta_2).with_epsilon(1e-8);
-            adam.with_weight_decay((decay > 0.0).then(|| WeightDecayConfig::new(decay))).init()
-        }
-        OptimizerKind::Adamw => {
-            AdamWConfig::new().with_beta_2(beta_2).with_epsilon(1e-8).with_weight_decay(decay).init()
-        }
-    }
-}
-
 /// Everything a run holds while it goes.
-struct Run<'a> {
-    config: &'a TrainConfig,
+struct Run<'a, C: Trained> {
+    config: &'a TrainConfig<C>,
     options: &'a RunOptions,
     device: Device,
     pairs: TrainingPairs,
     held_out: Vec<Pair>,
     workers: Workers,
     plan: Plan,
-    model: Srrf,
+    model: C::Network,
     optimizer: ModuleOptimizer,
     progress: Progress,
     log: Log,
@@ -162,8 +147,8 @@ struct Run<'a> {
 ///
 /// # Errors
 /// [`RunError`]; the last checkpoint stays usable.
-pub fn run(
-    config: &TrainConfig,
+pub fn run<C: Trained>(
+    config: &TrainConfig<C>,
     options: &RunOptions,
     shapes: Box<dyn ShapeSource>,
     device: Device,
@@ -197,7 +182,7 @@ pub fn run(
             && ((step + 1).is_multiple_of(run.plan.steps_in(config.keep.validate_epochs)) || last)
         {
             let result = run.validate()?;
-            let line = summary(step + 1, epoch, &result);
+            let line = summary(step + 1, epoch, &result, C::ROWS);
             if bar.is_hidden() { (options.say)(&line) } else { bar.println(line) }
         }
         bar.set_position(run.progress.step as u64);
@@ -216,9 +201,9 @@ pub fn run(
     Ok(Ended { step: run.progress.step, complete, skipped: run.progress.skipped, best })
 }
 
-impl<'a> Run<'a> {
+impl<'a, C: Trained> Run<'a, C> {
     fn open(
-        config: &'a TrainConfig,
+        config: &'a TrainConfig<C>,
         options: &'a RunOptions,
         shapes: Box<dyn ShapeSource>,
         device: Device,
@@ -279,15 +264,8 @@ impl<'a> Run<'a> {
     /// One step: gradient, check, clip, update.
     fn step(&mut self, step: usize, rate: f64) -> Result<Losses, RunError> {
         let config = self.config;
-        let context = StepContext {
-            stage: &config.stages[self.plan.stage(step)],
-            losses: &config.losses,
-            integration: &config.network.integration,
-            pairs: &self.pairs,
-            device: &self.device,
-            batch: config.optimizer.batch,
-            shard: config.optimizer.shard,
-        };
+        let stage = &config.stages[self.plan.stage(step)];
+        let context = StepContext { config, stage, pairs: &self.pairs, device: &self.device };
         let mut outcome = gradient(&context, &self.model, step, &self.workers)?;
         if !outcome.norm.is_finite() {
             self.progress.skipped += 1;
@@ -309,11 +287,11 @@ impl<'a> Run<'a> {
     }
 
     fn validate(&mut self) -> Result<Validation, RunError> {
-        let integration = &self.config.network.integration;
-        let result = validate(&self.model, integration, &self.held_out, &self.device, &self.workers)?;
+        let network = &self.config.network;
+        let result = validate(network, &self.model, &self.held_out, &self.device, &self.workers)?;
         let step = self.progress.step;
         self.log.validation(step, self.plan.epochs(step), &result).map_err(|e| self.io(e))?;
-        let value = result.scores["fused"].rmse_r;
+        let value = C::ROWS.last().map_or(f64::NAN, |row| result.scores[row].rmse_r);
         if self.progress.best.is_none_or(|best| value < best) {
             self.progress.best = Some(value);
             self.export("best.safetensors", Some(&result))?;
@@ -328,7 +306,7 @@ impl<'a> Run<'a> {
         self.progress.cpu_seconds = cpu + cpu_seconds() - cpu_start;
         checkpoint::save(&self.options.folder, self.config, &self.model, &self.optimizer, &self.progress)?;
         self.export("last.safetensors", None)?;
-        self.log.draw().map_err(|e| self.io(std::io::Error::other(e)))
+        self.log.draw(C::ROWS, C::CURVES).map_err(|e| self.io(std::io::Error::other(e)))
     }
 
     /// Weights in half precision, with what is known of them in the header.
@@ -369,15 +347,16 @@ impl<'a> Run<'a> {
 }
 
 /// The weights that `start` of the configuration names.
-fn starting_model(start: &str, config: &TrainConfig, device: &Device) -> Result<Srrf, RunError> {
-    let loaded = match embedded::load(start, device) {
-        Some(loaded) => loaded?,
-        None => load_weights(Path::new(start), device)?,
-    };
+fn starting_model<C: Trained>(
+    start: &str,
+    config: &TrainConfig<C>,
+    device: &Device,
+) -> Result<C::Network, RunError> {
+    let loaded = C::start(start, device)?;
     // Parameters that only this network has keep their initial values.
     let fresh = init::seeded(config.network.init(device), config.seed);
     let mut values = parameters(&fresh);
-    for (name, theirs) in parameters(&loaded.model) {
+    for (name, theirs) in parameters(&loaded) {
         match values.get_mut(&name) {
             Some(ours) if ours.0 == theirs.0 => *ours = theirs,
             _ => return Err(RunError::Start { start: start.to_string(), name }),
@@ -411,17 +390,12 @@ fn message(
     format!("{stage}  epoch {epoch:.2}  loss {total:.4}  lr {rate:.1e}  {pairs:.1} pairs/s")
 }
 
-fn summary(step: usize, epoch: f64, result: &Validation) -> String {
-    let row = |name: &str| {
+fn summary(step: usize, epoch: f64, result: &Validation, rows: &[&str]) -> String {
+    let row = |name: &&str| {
         let s = &result.scores[name];
         format!("{name} {:.2}/{:.2}/{:.2}", s.rmse_r, s.mae_r, s.median_rot_deg)
     };
-    format!(
-        "step {step}, epoch {epoch:.2}: RMSE/MAE/median of R in degrees: {}, {}, {}; skeleton d {:.3}, spread {:.3}",
-        row("dense"),
-        row("skeleton"),
-        row("fused"),
-        result.skeleton_chamfer,
-        result.skeleton_spread
-    )
+    let rows = rows.iter().map(row).collect::<Vec<_>>().join(", ");
+    let notes: String = result.notes.iter().map(|(name, value)| format!(", {name} {value:.3}")).collect();
+    format!("step {step}, epoch {epoch:.2}: RMSE/MAE/median of R in degrees: {rows}{notes}")
 }

@@ -1,6 +1,7 @@
 //! Where a run stands: steps, stages, epochs and the learning rate.
 
 use crate::config::{Schedule, StageConfig, TrainConfig};
+use crate::network::Trained;
 
 /// The steps of a run.
 #[derive(Debug, Clone)]
@@ -15,7 +16,7 @@ pub struct Plan {
 
 impl Plan {
     /// The plan of `config` over `shapes` training shapes.
-    pub fn new(config: &TrainConfig, shapes: usize) -> Self {
+    pub fn new<C: Trained>(config: &TrainConfig<C>, shapes: usize) -> Self {
         let batch = config.optimizer.batch;
         let mut bounds = vec![0];
         for stage in &config.stages {

@@ -2,26 +2,22 @@
 
 use std::collections::BTreeMap;
 
-use srrf_cloud::Rigid;
 use srrf_corrupt::Pair;
 use srrf_eval::{MetricError, PairError, Scores};
-use srrf_model::{IntegrationConfig, Srrf, chamfer, spread, transform};
 
-use crate::step::{Workers, to_batch};
+use crate::network::Trained;
+use crate::step::{Workers, to_shard};
 
 /// Pairs that go through the network together.
 const CHUNK: usize = 4;
 
-/// Results by row: `dense`, `skeleton`, `fused`.
+/// Results.
 #[derive(Debug, Clone)]
 pub struct Validation {
-    /// Scores of each pose.
+    /// Scores of each row of [`Trained::ROWS`].
     pub scores: BTreeMap<&'static str, Scores>,
-    /// Mean Chamfer distance (unsquared, both ways) between the posed source skeleton and the
-    /// target skeleton.
-    pub skeleton_chamfer: f64,
-    /// Root mean square distance of skeleton points from their mean.
-    pub skeleton_spread: f64,
+    /// Means of the network's other quantities, such as those of skeletons.
+    pub notes: BTreeMap<&'static str, f64>,
 }
 
 /// Why a validation failed.
@@ -39,44 +35,32 @@ pub enum ValidateError {
 ///
 /// # Errors
 /// [`ValidateError`] when nothing can be scored.
-pub fn validate(
-    model: &Srrf,
-    integration: &IntegrationConfig,
+pub fn validate<C: Trained>(
+    config: &C,
+    model: &C::Network,
     pairs: &[Pair],
     device: &burn::tensor::Device,
     workers: &Workers,
 ) -> Result<Validation, ValidateError> {
     let chunks: Vec<&[Pair]> = pairs.chunks(CHUNK).collect();
-    let run = |i: usize| {
-        let (batch, rotation, translation) = to_batch(chunks[i], device)?;
-        let output = model.forward(integration, batch.source.clone(), batch.target.clone(), 0.5);
-        let poses: [Vec<Option<Rigid>>; 3] = [
-            batch.poses(&output.dense.rotation, &output.dense.translation),
-            batch.poses(&output.skeleton.rotation, &output.skeleton.translation),
-            batch.poses(&output.fused.rotation, &output.fused.translation),
-        ];
-        let posed = transform(output.source_skeleton.points, rotation, translation);
-        let target = output.target_skeleton.points;
-        let skeletons =
-            (chamfer(posed, target.clone()).into_scalar::<f64>(), spread(target).into_scalar::<f64>());
-        Some((poses, skeletons))
-    };
+    let run = |i: usize| Some(config.found(model, to_shard(chunks[i], 0.5, device)?));
     let results = workers.map(chunks.len(), run).ok_or(ValidateError::Failed)?;
 
-    let mut errors: [Vec<PairError>; 3] = Default::default();
-    let (mut skeleton_chamfer, mut skeleton_spread) = (0.0, 0.0);
+    let mut errors: Vec<Vec<PairError>> = vec![Vec::new(); C::ROWS.len()];
+    let mut notes = BTreeMap::new();
     for (chunk, result) in chunks.iter().zip(results) {
-        let (poses, (distance, spread)) = result.ok_or(ValidateError::Failed)?;
-        for (errors, poses) in errors.iter_mut().zip(poses) {
+        let found = result.ok_or(ValidateError::Failed)?;
+        for (errors, poses) in errors.iter_mut().zip(found.poses) {
             let truths = chunk.iter().map(|pair| &pair.target_from_source);
             errors.extend(poses.iter().zip(truths).map(|(p, truth)| PairError::new(p.as_ref(), truth)));
         }
-        skeleton_chamfer += distance * chunk.len() as f64 / pairs.len() as f64;
-        skeleton_spread += spread * chunk.len() as f64 / pairs.len() as f64;
+        for (name, value) in found.notes {
+            *notes.entry(name).or_insert(0.0) += value * chunk.len() as f64 / pairs.len() as f64;
+        }
     }
     let mut scores = BTreeMap::new();
-    for (name, errors) in ["dense", "skeleton", "fused"].into_iter().zip(&errors) {
-        scores.insert(name, Scores::from_errors(errors)?);
+    for (name, errors) in C::ROWS.iter().zip(&errors) {
+        scores.insert(*name, Scores::from_errors(errors)?);
     }
-    Ok(Validation { scores, skeleton_chamfer, skeleton_spread })
+    Ok(Validation { scores, notes })
 }

@@ -23,8 +23,9 @@ use srrf_model::weights::parameters;
 use srrf_model::{Srrf, correspondence_loss, init, registration_loss, skeleton_loss};
 use srrf_train::config::TrainConfig;
 use srrf_train::data::TrainingPairs;
-use srrf_train::run::optimizer;
-use srrf_train::step::{StepContext, Workers, gradient, to_batch};
+use srrf_train::network::Shard;
+use srrf_train::optimizer::optimizer;
+use srrf_train::step::{StepContext, Workers, gradient, to_shard};
 
 const FORWARD: f64 = 1e-4;
 const GRADIENT: f64 = 1e-3;
@@ -41,7 +42,7 @@ type Numbers = BTreeMap<String, Vec<f64>>;
 /// The smoke configuration with whole clouds, so that every shard has the same shapes, and small batches.
 fn config() -> TrainConfig {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/smoke.toml");
-    let mut config = TrainConfig::read(&path).unwrap();
+    let mut config = <TrainConfig>::read(&path).unwrap();
     config.draw.independent = 0.0;
     (config.optimizer.batch, config.optimizer.shard) = (4, 2);
     config
@@ -95,7 +96,8 @@ fn values<const D: usize>(tensor: &Tensor<D>) -> Vec<f64> {
 /// Poses, matches and skeletons of some pairs, and the gradient of the sum of all losses.
 fn pass(device: &Device, dtype: DType) -> (Numbers, Numbers) {
     let config = config();
-    let (batch, rotation, translation) = to_batch(&pairs(&config).shard(0, PAIRS).unwrap(), device).unwrap();
+    let pairs = pairs(&config).shard(0, PAIRS).unwrap();
+    let Shard { batch, rotation, translation, .. } = to_shard(&pairs, PHASE, device).unwrap();
     let (source, target) = (batch.source.cast(dtype), batch.target.cast(dtype));
     let (rotation, translation) = (rotation.cast(dtype), translation.cast(dtype));
     let model = network(&config, device).map(&mut Cast(dtype)).train();
@@ -132,15 +134,8 @@ fn pass(device: &Device, dtype: DType) -> (Numbers, Numbers) {
 fn train(device: &Device) -> (Vec<f64>, Vec<f64>) {
     let config = config();
     let (pairs, workers) = (pairs(&config), Workers::new(2).unwrap());
-    let context = StepContext {
-        stage: config.stages.iter().find(|stage| stage.registration).unwrap(),
-        losses: &config.losses,
-        integration: &config.network.integration,
-        pairs: &pairs,
-        device,
-        batch: config.optimizer.batch,
-        shard: config.optimizer.shard,
-    };
+    let stage = config.stages.iter().find(|stage| stage.registration).unwrap();
+    let context = StepContext { config: &config, stage, pairs: &pairs, device };
     let mut optimizer = optimizer(&config.optimizer);
     let mut model = network(&config, device).valid();
     let start = flat(&model);

@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn unknown_names_are_refused_and_unknown_defaults_left_out() {
-        let context = MethodContext { weights: None, device: "flex".into() };
+        let context = MethodContext::of_srrf(None, "flex");
         let cast = Cast::new(&["oracle".into(), "icp".into()], &context).unwrap();
         assert_eq!((cast.rows.as_slice(), cast.methods.len()), (&["icp".into(), "oracle".into()][..], 1));
         assert!(cast.method("icp").is_some() && cast.method("srrf").is_none());

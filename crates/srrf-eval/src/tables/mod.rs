@@ -77,7 +77,7 @@ struct Evidence {
 /// # Errors
 /// [`EvalError`] where data, weights or folders cannot be used.
 pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, EvalError> {
-    let context = MethodContext { weights: options.weights.clone(), device: options.device.clone() };
+    let context = MethodContext::of_srrf(options.weights.clone(), &options.device);
     let cast = Cast::new(&options.methods, &context)?;
     crate::report::prepare(&options.out)?;
     let cache = Cache::open(&options.cache_folder(), &options.device)?;
@@ -168,7 +168,7 @@ impl Stage<'_> {
                 evidence.missing.push((title.to_owned(), reason));
                 continue;
             };
-            let context = MethodContext { weights: Some(weights), device: options.device.clone() };
+            let context = MethodContext::of_srrf(Some(weights), &options.device);
             let cast = Cast::new(&NETWORK_ROWS.map(str::to_owned), &context)?;
             let mut protocol = plan::main_protocol(options, self.shapes);
             if key == "table5" {
@@ -185,8 +185,7 @@ impl Stage<'_> {
     /// The networks of `--variant`.
     fn variants(&self, evidence: &mut Evidence, say: Listener<'_>) -> Result<(), EvalError> {
         for (name, weights) in &self.options.variant {
-            let context =
-                MethodContext { weights: Some(weights.clone()), device: self.options.device.clone() };
+            let context = MethodContext::of_srrf(Some(weights.clone()), &self.options.device);
             let cast = Cast::new(&NETWORK_ROWS.map(str::to_owned), &context)?;
             let main = plan::main_protocol(self.options, self.shapes);
             let pairs = self.pairs(Protocol { severities: vec![plan::MIDDLE], ..main })?;

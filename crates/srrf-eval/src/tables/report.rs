@@ -160,7 +160,7 @@ fn skeleton_picture(
 ) -> Result<Option<super::document::Figure>, EvalError> {
     let without = super::model_or(stage.options.no_ddl_weights.as_deref(), "srrf-no-ddl");
     let without = without.map(|weights| {
-        let context = MethodContext { weights: Some(weights), device: stage.options.device.clone() };
+        let context = MethodContext::of_srrf(Some(weights), &stage.options.device);
         super::Cast::new(&["srrf".to_owned()], &context)
     });
     let without = without.transpose()?;

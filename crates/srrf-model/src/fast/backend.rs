@@ -6,7 +6,7 @@ use burn::backend::{Autodiff, Backend, Flex, backend_extension};
 
 use super::group::Neighbours;
 use super::linear::Activation;
-use super::{add_norm, attention, group, linear};
+use super::{add_norm, attention, group, group_norm, linear};
 
 /// Operations that the flex backend has on top of Burn's own.
 #[backend_extension(Flex, Autodiff)]
@@ -33,6 +33,15 @@ pub trait FastOps: Backend {
         b: FloatTensor<Self>,
         gamma: FloatTensor<Self>,
         beta: FloatTensor<Self>,
+    ) -> FloatTensor<Self>;
+
+    /// Group norm, then ReLU.
+    fn fast_group_norm_relu(
+        x: FloatTensor<Self>,
+        gamma: FloatTensor<Self>,
+        beta: FloatTensor<Self>,
+        clouds: usize,
+        groups: usize,
     ) -> FloatTensor<Self>;
 
     /// `relu(table[j] - shift[i])` for each neighbour `j` of each sample `i`.
@@ -74,6 +83,16 @@ impl FastOps for Flex {
         add_norm::forward(&a, &b, &gamma, &beta).0
     }
 
+    fn fast_group_norm_relu(
+        x: FloatTensor<Self>,
+        gamma: FloatTensor<Self>,
+        beta: FloatTensor<Self>,
+        clouds: usize,
+        groups: usize,
+    ) -> FloatTensor<Self> {
+        group_norm::forward(&x, &gamma, &beta, clouds, groups).0
+    }
+
     fn fast_gather_relu(
         table: FloatTensor<Self>,
         shift: FloatTensor<Self>,
@@ -113,6 +132,16 @@ impl<C: CheckpointStrategy> FastOps for Autodiff<Flex, C> {
         beta: FloatTensor<Self>,
     ) -> FloatTensor<Self> {
         add_norm::tracked::<C>(a, b, gamma, beta)
+    }
+
+    fn fast_group_norm_relu(
+        x: FloatTensor<Self>,
+        gamma: FloatTensor<Self>,
+        beta: FloatTensor<Self>,
+        clouds: usize,
+        groups: usize,
+    ) -> FloatTensor<Self> {
+        group_norm::tracked::<C>(x, gamma, beta, clouds, groups)
     }
 
     fn fast_gather_relu(

@@ -35,6 +35,23 @@ pub fn add_norm(norm: &LayerNorm, a: Tensor<2>, b: Tensor<2>) -> Tensor<2> {
     norm.forward(a + b)
 }
 
+/// Group norm and ReLU; shapes as in [`super::group_norm_relu`].
+pub fn group_norm_relu(
+    x: Tensor<2>,
+    gamma: Tensor<1>,
+    beta: Tensor<1>,
+    clouds: usize,
+    groups: usize,
+) -> Tensor<2> {
+    let [rows, channels] = x.dims();
+    let grouped = x.reshape([clouds, rows / clouds, groups, channels / groups]);
+    let mean = grouped.clone().mean_dim(3).mean_dim(1);
+    let centred = grouped - mean;
+    let variance = centred.clone().square().mean_dim(3).mean_dim(1);
+    let normal = (centred / (variance + super::group_norm::EPSILON).sqrt()).reshape([rows, channels]);
+    relu(normal * gamma.unsqueeze::<2>() + beta.unsqueeze::<2>())
+}
+
 /// Gathering with a shift; shapes as in [`super::gather_relu`].
 pub fn gather_relu(table: Tensor<2>, shift: Tensor<2>, neighbours: &[i64]) -> Tensor<2> {
     let [samples, width] = shift.dims();

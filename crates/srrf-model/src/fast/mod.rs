@@ -1,6 +1,6 @@
 //! Custom operations for the blocks where the time goes: a linear layer with its activation,
-//! multi-head attention, the sum of two tensors under a layer norm, and the gathering of neighbours. Each is one node of the graph
-//! with a hand-written backward pass, on Burn's flex backend in `f32`; every other backend and number
+//! multi-head attention, the sum of two tensors under a layer norm, group norm, and the gathering of
+//! neighbours. Each is one node of the graph with a hand-written backward pass, on Burn's flex backend in `f32`; every other backend and number
 //! type takes the composition of Burn's own operations in [`composed`].
 //!
 //! The two ways are the same mathematics; `tests/fast.rs` holds them against each other and against
@@ -11,6 +11,7 @@ mod attention;
 mod backend;
 pub mod composed;
 mod group;
+mod group_norm;
 mod kernels;
 mod linear;
 
@@ -74,6 +75,25 @@ pub fn add_norm(norm: &LayerNorm, a: Tensor<2>, b: Tensor<2>) -> Tensor<2> {
         }
         _ => composed::add_norm(norm, a, b),
     }
+}
+
+/// Group norm with a ReLU behind it: the channels of each cloud in `groups` groups, each brought to mean
+/// 0 and deviation 1 over its channels and all rows of the cloud, then scaled and shifted by channel.
+///
+/// # Shapes
+/// - `x` and output: `[clouds * n, channels]`; `gamma`, `beta`: `[channels]`
+pub fn group_norm_relu(
+    x: Tensor<2>,
+    gamma: Tensor<1>,
+    beta: Tensor<1>,
+    clouds: usize,
+    groups: usize,
+) -> Tensor<2> {
+    if !served(&x) {
+        return composed::group_norm_relu(x, gamma, beta, clouds, groups);
+    }
+    let (x, gamma, beta) = (x.into_dispatch(), gamma.into_dispatch(), beta.into_dispatch());
+    Tensor::from_dispatch(<Dispatch as FastOps>::fast_group_norm_relu(x, gamma, beta, clouds, groups))
 }
 
 /// `relu(table[j] - shift[i])` for each neighbour `j` of each sample `i`.

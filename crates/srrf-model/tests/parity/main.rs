@@ -14,6 +14,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/parameters.rs"]
+mod parameters;
 mod reference;
 
 use burn::tensor::{Device, Tensor};

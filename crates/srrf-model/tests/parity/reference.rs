@@ -3,13 +3,14 @@
 
 use std::collections::BTreeMap;
 
-use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
+use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{DType, Device, Gradients, Tensor, TensorData};
 use serde::Deserialize;
 use srrf_model::{Srrf, SrrfConfig};
 
 use crate::common::{Numbers, difference, values};
+use crate::parameters::{Directions, Fill};
 
 /// The types to run in, with the tolerances of values and of gradients.
 const TYPES: [(DType, f64, f64); 2] = [(DType::F64, 1e-9, 1e-6), (DType::F32, 2e-5, 1e-4)];
@@ -82,22 +83,17 @@ impl Reference {
     /// Compares norm and one product of the gradient of every parameter of `module`, whose path in
     /// the network is `prefix`.
     pub fn compare_parameters<M: Module>(&self, name: &str, prefix: &str, module: &M, grads: Gradients) {
-        let mut found = Directions {
-            grads: GradientsParams::from_grads(grads, module),
-            path: prefix.split('.').filter(|field| !field.is_empty()).map(str::to_string).collect(),
-            found: BTreeMap::new(),
-        };
-        module.visit(&mut found);
+        let found = Directions::of(module, prefix, GradientsParams::from_grads(grads, module));
         let wanted: BTreeMap<String, [f64; 2]> = self.get(&format!("{name}.gradient.parameters"));
         let wanted: BTreeMap<_, _> =
             wanted.into_iter().filter(|(path, _)| path.starts_with(prefix)).collect();
-        assert_eq!(found.found.keys().collect::<Vec<_>>(), wanted.keys().collect::<Vec<_>>());
+        assert_eq!(found.keys().collect::<Vec<_>>(), wanted.keys().collect::<Vec<_>>());
         let largest = wanted.values().map(|[norm, _]| *norm).fold(0.0, f64::max);
         for (path, wanted) in wanted {
             // Some gradients are 0 by construction (a bias before a softmax) and come out as what the
             // rounding of their terms leaves: compare those with the others' size.
             let scale = wanted[0].max(1e-2 * largest);
-            let error = difference(&found.found[&path], &wanted) / scale;
+            let error = difference(&found[&path], &wanted) / scale;
             assert!(
                 error < self.gradient_tolerance,
                 "{name}, {path} in {:?}: {error:e} of {scale}",
@@ -118,74 +114,6 @@ impl Reference {
     pub fn weighed<const D: usize>(&self, numbers: &mut Numbers, tensor: &Tensor<D>) -> Tensor<1> {
         let drawn = TensorData::new(numbers.many(tensor.shape().num_elements()), tensor.dims());
         (tensor.clone() * Tensor::from_data(drawn, (&self.device, self.dtype))).sum()
-    }
-}
-
-/// FNV-1a, 64 bits.
-fn fnv(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, byte| (h ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
-}
-
-/// Gives each parameter the numbers that the generator documents.
-struct Fill {
-    path: Vec<String>,
-    dtype: DType,
-    shapes: BTreeMap<String, Vec<usize>>,
-}
-
-impl ModuleMapper for Fill {
-    fn enter_module(&mut self, name: &str, _container_type: &str) {
-        self.path.push(name.to_string());
-    }
-
-    fn exit_module(&mut self, _name: &str, _container_type: &str) {
-        self.path.pop();
-    }
-
-    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let (id, tensor, mapper) = param.consume();
-        let (path, dims) = (self.path.join("."), tensor.dims());
-        let mut numbers = Numbers(fnv(&path));
-        let field = self.path.last().map(String::as_str);
-        let drawn = (0..dims.iter().product::<usize>()).map(|_| {
-            let signed = numbers.signed();
-            let value = match field {
-                Some("weight") => signed * (1.5 / (dims[0] as f64).sqrt()),
-                Some("bias" | "beta") => signed * 0.2,
-                Some("gamma") => 1.0 + signed * 0.3,
-                _ => signed * 0.4,
-            };
-            f64::from(value as f32)
-        });
-        let data = TensorData::new(drawn.collect::<Vec<f64>>(), dims);
-        self.shapes.insert(path, dims.to_vec());
-        Param::from_mapped_value(id, Tensor::from_data(data, (&tensor.device(), self.dtype)), mapper)
-    }
-}
-
-/// Norm and product with a drawn direction of each parameter's gradient.
-struct Directions {
-    grads: GradientsParams,
-    path: Vec<String>,
-    found: BTreeMap<String, [f64; 2]>,
-}
-
-impl ModuleVisitor for Directions {
-    fn enter_module(&mut self, name: &str, _container_type: &str) {
-        self.path.push(name.to_string());
-    }
-
-    fn exit_module(&mut self, _name: &str, _container_type: &str) {
-        self.path.pop();
-    }
-
-    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let Some(gradient) = self.grads.get::<D>(param.id) else { return };
-        let (path, gradient) = (self.path.join("."), values(&gradient));
-        let direction = Numbers(fnv(&format!("{path}.direction"))).many(gradient.len());
-        let norm = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
-        let along = gradient.iter().zip(&direction).map(|(g, d)| g * d).sum();
-        self.found.insert(path, [norm, along]);
     }
 }
 

@@ -23,7 +23,7 @@ use srrf_corrupt::Pair;
 use srrf_model::{PairBatch, Srrf, init, keep_freed_memory};
 use srrf_train::config::{StageConfig, TrainConfig};
 use srrf_train::data::TrainingPairs;
-use srrf_train::run::optimizer;
+use srrf_train::optimizer::optimizer;
 use srrf_train::step::{StepContext, Workers, gradient, scale};
 
 use crate::clock::{median, memory_mib, summary, timed};
@@ -81,7 +81,7 @@ enum Figure {
 fn main() -> Result<(), Failure> {
     keep_freed_memory();
     let arguments = Arguments::parse();
-    let mut config = TrainConfig::read(&arguments.config)?;
+    let mut config = <TrainConfig>::read(&arguments.config)?;
     config.draw.independent = 0.0; // every pair has pairs.points points a cloud
     let bench = Bench::new(config, &arguments.device)?;
     let start_mib = memory_mib("VmHWM:");
@@ -132,15 +132,7 @@ impl Bench {
     /// Whole training steps, as `srrf-train` makes them.
     fn steps(&self, stage: &StageConfig, arguments: &Arguments) -> Result<Map<String, Value>, Failure> {
         let optimizer_config = &self.config.optimizer;
-        let context = StepContext {
-            stage,
-            losses: &self.config.losses,
-            integration: &self.config.network.integration,
-            pairs: &self.pairs,
-            device: &self.device,
-            batch: optimizer_config.batch,
-            shard: optimizer_config.shard,
-        };
+        let context = StepContext { config: &self.config, stage, pairs: &self.pairs, device: &self.device };
         let workers = Workers::new(arguments.threads)?;
         let mut optimizer = optimizer(optimizer_config);
         let mut model = self.model.clone();

@@ -6,12 +6,13 @@ use burn::tensor::Tensor;
 use serde_json::{Map, Value, json};
 use srrf_corrupt::Pair;
 use srrf_model::{
-    BranchConfig, BranchOutput, PairBatch, SoftMatching, Srrf, SrrfOutput, correspondence_loss, procrustes,
+    BranchConfig, BranchOutput, SoftMatching, Srrf, SrrfOutput, correspondence_loss, procrustes,
     registration_loss, skeleton_loss,
 };
 use srrf_train::config::TrainConfig;
-use srrf_train::run::optimizer;
-use srrf_train::step::to_batch;
+use srrf_train::network::Shard;
+use srrf_train::optimizer::optimizer;
+use srrf_train::step::to_shard;
 
 use crate::clock::{clock, median};
 use crate::{Arguments, Bench, Failure, PHASE};
@@ -41,13 +42,6 @@ impl Parts<'_> {
     }
 }
 
-/// One shard on the device, with its true poses.
-struct Shard {
-    clouds: PairBatch,
-    rotation: Tensor<3>,
-    translation: Tensor<2>,
-}
-
 /// Each stage's forward pass apart, without a graph; then both training stages with their graphs.
 pub fn profile(bench: &Bench, arguments: &Arguments) -> Result<Map<String, Value>, Failure> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
@@ -58,8 +52,7 @@ pub fn profile(bench: &Bench, arguments: &Arguments) -> Result<Map<String, Value
     pool.install(|| -> Result<(), Failure> {
         parts.time("pairs", || bench.pairs.shard(0, count).map(|pairs: Vec<Pair>| pairs.len()));
         let ragged = "the pairs differ in their number of points";
-        let (clouds, rotation, translation) = to_batch(&pairs, &bench.device).ok_or(ragged)?;
-        let shard = Shard { clouds, rotation, translation };
+        let shard = to_shard(&pairs, PHASE, &bench.device).ok_or(ragged)?;
         stages(&mut parts, bench, &shard);
         registration_stage(&mut parts, &bench.config, &bench.model, &shard);
         skeleton_stage(&mut parts, &bench.config, &bench.model, &shard);
@@ -71,7 +64,7 @@ pub fn profile(bench: &Bench, arguments: &Arguments) -> Result<Map<String, Value
 /// The stages of the forward pass; features come from modules of the same sizes.
 fn stages(parts: &mut Parts, bench: &Bench, shard: &Shard) {
     let network = &bench.config.network;
-    let (source, target) = (&shard.clouds.source, &shard.clouds.target);
+    let (source, target) = (&shard.batch.source, &shard.batch.target);
     parts.time("sem", || (bench.model.sem.forward(source.clone()), bench.model.sem.forward(target.clone())));
     let output = bench.model.forward(&network.integration, source.clone(), target.clone(), PHASE);
     let (x, y) = (&output.source_skeleton.points, &output.target_skeleton.points);
@@ -128,7 +121,7 @@ fn registration_stage(parts: &mut Parts, config: &TrainConfig, model: &Srrf, sha
     let names =
         ["registration_forward", "registration_losses", "registration_backward", "registration_optimizer"];
     parts.rounds(&names, || {
-        let (source, target) = (shard.clouds.source.clone(), shard.clouds.target.clone());
+        let (source, target) = (shard.batch.source.clone(), shard.batch.target.clone());
         let (output, forward) = clock(|| fork.forward(&config.network.integration, source, target, PHASE));
         let (total, losses) = clock(|| loss(&output));
         let (gradients, backward) = clock(|| GradientsParams::from_grads(total.backward(), &fork));
@@ -141,7 +134,7 @@ fn registration_stage(parts: &mut Parts, config: &TrainConfig, model: &Srrf, sha
 /// The skeleton stage of training.
 fn skeleton_stage(parts: &mut Parts, config: &TrainConfig, model: &Srrf, shard: &Shard) {
     let sem = model.sem.clone().train();
-    let (source, target) = (&shard.clouds.source, &shard.clouds.target);
+    let (source, target) = (&shard.batch.source, &shard.batch.target);
     parts.rounds(&["skeleton_forward", "skeleton_losses", "skeleton_backward"], || {
         let (skeletons, forward) = clock(|| (sem.forward(source.clone()), sem.forward(target.clone())));
         let (loss, losses) = clock(|| {

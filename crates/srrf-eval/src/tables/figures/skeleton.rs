@@ -168,7 +168,7 @@ mod tests {
     fn skeletons_are_drawn_from_the_models_own_numbers() {
         let shapes = data::procedural(1).unwrap();
         let cloud = shapes.sample(0, 300, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
-        let context = MethodContext { weights: None, device: "flex".into() };
+        let context = MethodContext::of_srrf(None, "flex");
         let found = extract(&context, &cloud).unwrap();
         assert_eq!((found.points.len(), found.radii.len()), (64, 64));
         assert_eq!(found.weights.len(), found.samples.len() * 64);

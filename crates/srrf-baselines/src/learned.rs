@@ -1,0 +1,112 @@
+//! What the learned baselines share: the seam to training, and the way to [`Register`].
+
+use std::fmt::Debug;
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use srrf_cloud::{PointCloud, Register, RegisterError, Registration};
+use srrf_model::weights::LoadedModel;
+use srrf_model::{NetworkConfig, PairBatch, subsample};
+
+/// Largest number of points that a network sees of a cloud: what it was trained with.
+const MAX_POINTS: usize = 1024;
+
+/// Trained weights in the program, by the name of the method. To add some: put `srrf-train`'s
+/// `best.safetensors` into `weights/` as `<method>.safetensors`, and a line with `include_bytes!` here.
+const EMBEDDED: &[(&str, &[u8])] = &[];
+
+/// The embedded weights of a method, if there are any.
+pub fn embedded(name: &str) -> Option<&'static [u8]> {
+    EMBEDDED.iter().find(|(known, _)| *known == name).map(|(_, bytes)| *bytes)
+}
+
+/// Pairs to learn from, in network units (see [`PairBatch`]).
+#[derive(Debug, Clone)]
+pub struct Lesson {
+    /// `[batch, points, 3]`.
+    pub source: Tensor<3>,
+    /// `[batch, points, 3]`.
+    pub target: Tensor<3>,
+    /// The true rotation, `[batch, 3, 3]`.
+    pub rotation: Tensor<3>,
+    /// The true translation, `[batch, 3]`.
+    pub translation: Tensor<2>,
+    /// In [0, 1): which points carry tokens, in networks that take not all of them.
+    pub phase: f32,
+}
+
+/// Poses: `target ~ R source + t`.
+#[derive(Debug, Clone)]
+pub struct Pose {
+    /// `[batch, 3, 3]`.
+    pub rotation: Tensor<3>,
+    /// `[batch, 3]`.
+    pub translation: Tensor<2>,
+}
+
+/// The sizes of a learned baseline, which say how it learns and how it answers.
+pub trait LearnedConfig: NetworkConfig {
+    /// Weights of its losses.
+    type Losses: Clone + Debug + PartialEq + Serialize + DeserializeOwned + Send + Sync;
+    /// Name of the method, in configurations and tables.
+    const NAME: &'static str;
+    /// Names of the losses.
+    const TERMS: &'static [&'static str];
+
+    /// The losses on some pairs, each of shape `[1]`, with their weights; one of weight 0 is only
+    /// reported.
+    fn losses(
+        &self,
+        losses: &Self::Losses,
+        network: &Self::Network,
+        lesson: &Lesson,
+    ) -> Vec<(&'static str, Tensor<1>, f64)>;
+
+    /// The answer, as at inference.
+    ///
+    /// # Shapes
+    /// - `source`, `target`: `[batch, points, 3]`, centred
+    fn pose(&self, network: &Self::Network, source: Tensor<3>, target: Tensor<3>) -> Pose;
+
+    /// How often the pose is refined within one answer.
+    fn passes(&self) -> usize {
+        1
+    }
+}
+
+/// A learned baseline as a registration method.
+pub struct LearnedRegister<C: LearnedConfig> {
+    network: C::Network,
+    config: C,
+    device: Device,
+}
+
+impl<C: LearnedConfig> LearnedRegister<C> {
+    /// The network of a weights file; `device` must be the one it was loaded on.
+    pub fn new(loaded: LoadedModel<C>, device: Device) -> Self {
+        Self { network: loaded.model.valid(), config: loaded.config, device }
+    }
+}
+
+impl<C: LearnedConfig> Register for LearnedRegister<C> {
+    fn name(&self) -> &str {
+        C::NAME
+    }
+
+    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+        source.check_rotation_observable().map_err(RegisterError::Source)?;
+        target.check_rotation_observable().map_err(RegisterError::Target)?;
+        let points = source.len().min(target.len()).min(MAX_POINTS);
+        let (source, target) = (subsample(source, points)?, subsample(target, points)?);
+        let no_pose = |why: &str| RegisterError::NoPose(why.into());
+        let batch = PairBatch::new(&[(&source, &target)], &self.device)
+            .ok_or_else(|| no_pose("the clouds differ in their number of points"))?;
+        let pose = self.config.pose(&self.network, batch.source.clone(), batch.target.clone());
+        let found = batch.poses(&pose.rotation, &pose.translation).pop().flatten();
+        let found = found
+            .ok_or_else(|| no_pose("the network's output is not finite; are the coordinates extreme?"))?;
+        Ok(Registration { iterations: self.config.passes(), ..Registration::from_pose(found) })
+    }
+}

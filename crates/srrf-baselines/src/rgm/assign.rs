@@ -1,0 +1,199 @@
+//! Assignments: Sinkhorn with slack, and the Hungarian method.
+
+use burn::tensor::{Tensor, TensorData};
+use srrf_model::geometry::rows;
+
+use crate::se3::constant;
+
+/// Scores beyond this are cut: `e^30` squared fits `f32`.
+const MOST: f64 = 30.0;
+/// A node whose row or column sums to less has no match.
+const LEAST_SUM: f64 = 0.5;
+
+/// Sinkhorn with a slack row and column of score 0, which take what has no match: rows and columns of the
+/// others are brought to sum 1 in turn, slack included.
+///
+/// The matrix is `u_i K_ij v_j` with `K = exp(scores)` all the time, so two vectors are iterated, which
+/// costs a product of matrix and vector each, where the form with logarithms costs a pass of `exp` and
+/// `log` over the matrix. The values are the same.
+///
+/// # Shapes
+/// - `scores`: `[batch, n, m]`, output: `[batch, n, m]`, without the slack
+pub(super) fn sinkhorn(scores: Tensor<3>, iterations: usize) -> Tensor<3> {
+    let [batch, n, m] = scores.dims();
+    let kernel = scores.clamp(-MOST, MOST).exp();
+    let transposed = kernel.clone().transpose();
+    let ones = |count: usize| constant(&vec![1.0; count], [1, count, 1], &kernel).repeat_dim(0, batch);
+    // Slack entries of the kernel are 1, and so are the factors of the slack row and column.
+    let (mut u, mut v) = (ones(n), ones(m));
+    for _ in 0..iterations {
+        u = (kernel.clone().matmul(v.clone()) + 1.0).recip();
+        v = (transposed.clone().matmul(u.clone()) + 1.0).recip();
+    }
+    kernel * u * v.transpose()
+}
+
+/// The match of each source point by the Hungarian method, and its weight: the assignment's entry, 0 for
+/// nodes without a match (all count where fewer than 3 would). Weights sum to 1 in each cloud.
+///
+/// # Shapes
+/// - `assignment`: `[batch, n, m]`, `target_points`: `[batch, m, 3]`
+/// - output: `[batch, n, 3]` and `[batch, n, 1]`
+pub(super) fn one_to_one(assignment: &Tensor<3>, target_points: &Tensor<3>) -> (Tensor<3>, Tensor<3>) {
+    let [batch, n, m] = assignment.dims();
+    let values = assignment.try_to_vec_as::<f64>().unwrap_or_default();
+    let (mut chosen, mut weights) = (Vec::with_capacity(batch * n), Vec::with_capacity(batch * n));
+    for (cloud, s) in values.chunks_exact((n * m).max(1)).enumerate() {
+        let columns = hungarian(s, n, m);
+        let row_sum = |i: usize| s[i * m..(i + 1) * m].iter().sum::<f64>();
+        let column_sum = |j: usize| (0..n).map(|i| s[i * m + j]).sum::<f64>();
+        let matched = |i: usize| {
+            let j = columns[i]?;
+            (row_sum(i) >= LEAST_SUM && column_sum(j) >= LEAST_SUM).then_some(s[i * m + j])
+        };
+        let mut found: Vec<f64> = (0..n).map(|i| matched(i).unwrap_or(0.0)).collect();
+        if found.iter().filter(|w| **w > 0.0).count() < 3 {
+            found = (0..n).map(|i| columns[i].map_or(0.0, |j| s[i * m + j].max(1e-12))).collect();
+        }
+        let sum: f64 = found.iter().sum();
+        weights.extend(found.iter().map(|w| w / sum.max(f64::MIN_POSITIVE)));
+        chosen.extend(columns.iter().map(|j| (cloud * m + j.unwrap_or(0)) as i64));
+    }
+    let points = rows(target_points.clone().reshape([batch * m, 3]), &chosen).reshape([batch, n, 3]);
+    let device = assignment.device().without_autodiff();
+    (points, Tensor::from_data(TensorData::new(weights, [batch, n, 1]), (&device, assignment.dtype())))
+}
+
+/// The assignment of rows to columns with the largest sum of `scores` (`n x m`, row-major): the column
+/// of each row, none for rows that are too many. Shortest augmenting paths, `O(n^2 m)`.
+fn hungarian(scores: &[f64], n: usize, m: usize) -> Vec<Option<usize>> {
+    if n > m {
+        let transposed: Vec<f64> = (0..n * m).map(|i| scores[(i % n) * m + i / n]).collect();
+        let mut columns = vec![None; n];
+        for (column, row) in hungarian(&transposed, m, n).into_iter().enumerate() {
+            if let Some(row) = row {
+                columns[row] = Some(column);
+            }
+        }
+        return columns;
+    }
+    // Rows and columns count from 1; column 0 stands for "none".
+    let (mut row_price, mut column_price) = (vec![0.0; n + 1], vec![0.0; m + 1]);
+    let mut row_of = vec![0_usize; m + 1];
+    for row in 1..=n {
+        row_of[0] = row;
+        let (mut least, mut from, mut done) =
+            (vec![f64::INFINITY; m + 1], vec![0_usize; m + 1], vec![false; m + 1]);
+        let mut column = 0;
+        while row_of[column] != 0 {
+            done[column] = true;
+            let i = row_of[column];
+            let (mut step, mut next) = (f64::INFINITY, 0);
+            for j in 1..=m {
+                if done[j] {
+                    continue;
+                }
+                let cost = -scores[(i - 1) * m + j - 1] - row_price[i] - column_price[j];
+                if cost < least[j] {
+                    (least[j], from[j]) = (cost, column);
+                }
+                if least[j] < step {
+                    (step, next) = (least[j], j);
+                }
+            }
+            if next == 0 {
+                return vec![None; n]; // scores that are not numbers
+            }
+            for j in 0..=m {
+                if done[j] {
+                    row_price[row_of[j]] += step;
+                    column_price[j] -= step;
+                } else {
+                    least[j] -= step;
+                }
+            }
+            column = next;
+        }
+        while column != 0 {
+            let before = from[column];
+            row_of[column] = row_of[before];
+            column = before;
+        }
+    }
+    let mut columns = vec![None; n];
+    for (j, &row) in row_of.iter().enumerate().skip(1) {
+        if row > 0 {
+            columns[row - 1] = Some(j - 1);
+        }
+    }
+    columns
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::tensor::Device;
+
+    use super::*;
+
+    fn scores(count: usize) -> Vec<f64> {
+        (0..count).map(|i| ((i * i) as f64 * 0.713).sin()).collect()
+    }
+
+    #[test]
+    fn sinkhorn_agrees_with_the_form_in_logarithms() {
+        let (n, m) = (5, 7);
+        let values: Vec<f64> = scores(n * m).iter().map(|v| 4.0 * v).collect();
+        let tensor = Tensor::from_data(TensorData::new(values.clone(), [1, n, m]), &Device::flex());
+        let found = sinkhorn(tensor, 20).try_to_vec_as::<f64>().unwrap();
+        let mut log = vec![vec![0.0; m + 1]; n + 1];
+        (0..n * m).for_each(|i| log[i / m][i % m] = values[i]);
+        for _ in 0..20 {
+            for row in log.iter_mut().take(n) {
+                let sum = row.iter().map(|v: &f64| v.exp()).sum::<f64>().ln();
+                row.iter_mut().for_each(|v| *v -= sum);
+            }
+            for j in 0..m {
+                let sum = log.iter().map(|row| row[j].exp()).sum::<f64>().ln();
+                log.iter_mut().for_each(|row| row[j] -= sum);
+            }
+        }
+        for (i, f) in found.iter().enumerate() {
+            assert!((f - log[i / m][i % m].exp()).abs() < 1e-5, "{i}");
+        }
+        let sums = |i: usize| found[i * m..(i + 1) * m].iter().sum::<f64>();
+        assert!((0..n).all(|i| sums(i) < 1.01) && (0..n).any(|i| sums(i) > 0.5));
+    }
+
+    #[test]
+    fn the_hungarian_method_finds_the_best_of_all() {
+        fn best(s: &[f64], m: usize, row: usize, used: &mut Vec<usize>) -> f64 {
+            if row * m == s.len() {
+                return 0.0;
+            }
+            let mut top = f64::NEG_INFINITY;
+            for j in 0..m {
+                if !used.contains(&j) {
+                    used.push(j);
+                    top = top.max(s[row * m + j] + best(s, m, row + 1, used));
+                    used.pop();
+                }
+            }
+            top
+        }
+        let (n, m) = (5, 6);
+        for shift in 0..9 {
+            let s = &scores(n * m + shift)[shift..];
+            let columns = hungarian(s, n, m);
+            let sum: f64 = columns.iter().enumerate().map(|(i, j)| s[i * m + j.unwrap()]).sum();
+            assert!((sum - best(s, m, 0, &mut vec![])).abs() < 1e-12);
+            // The same assignment from the other side.
+            let transposed: Vec<f64> = (0..n * m).map(|i| s[(i % n) * m + i / n]).collect();
+            let rows = hungarian(&transposed, m, n);
+            assert_eq!(rows.iter().filter(|r| r.is_none()).count(), 1);
+            for (j, i) in rows.iter().enumerate() {
+                assert!(i.is_none_or(|i| columns[i] == Some(j)));
+            }
+        }
+        assert_eq!(hungarian(&[f64::NAN; 4], 2, 2), [None, None]);
+    }
+}

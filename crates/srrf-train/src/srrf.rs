@@ -1,0 +1,144 @@
+//! How the SRRF network is trained.
+
+use std::path::Path;
+
+use burn::module::Module;
+use burn::optim::GradientsParams;
+use burn::tensor::{Device, Tensor};
+use srrf_cloud::Rigid;
+use srrf_model::weights::{WeightsError, load};
+use srrf_model::{
+    BranchOutput, Skeleton, Srrf, SrrfConfig, chamfer, correspondence_loss, embedded, registration_loss,
+    skeleton_loss, spread, transform,
+};
+
+use crate::config::{LossConfig, SemTraining, StageConfig};
+use crate::network::{Found, Shard, Terms, Trained};
+use crate::step::Losses;
+
+impl Trained for SrrfConfig {
+    type LossConfig = LossConfig;
+    const METHOD: &'static str = "srrf";
+    const ROWS: &'static [&'static str] = &["dense", "skeleton", "fused"];
+    const CURVES: &'static [&'static str] =
+        &["sem", "chamfer", "dense_correspondence", "skeleton_correspondence"];
+
+    fn start(start: &str, device: &Device) -> Result<Srrf, WeightsError> {
+        let loaded = match embedded::load(start, device) {
+            Some(loaded) => loaded?,
+            None => load(Path::new(start), device)?,
+        };
+        Ok(loaded.model)
+    }
+
+    fn wrong_stage(stage: &StageConfig) -> Option<(&'static str, &'static str)> {
+        (stage.sem == SemTraining::Frozen && !stage.registration)
+            .then_some(("registration", "must be true where sem is frozen, or the stage trains nothing"))
+    }
+
+    fn gradient(
+        &self,
+        losses: &LossConfig,
+        stage: &StageConfig,
+        network: &Srrf,
+        shard: Shard,
+    ) -> (GradientsParams, Losses) {
+        // Only what the stage trains is on the graph.
+        let trains_sem = stage.sem != SemTraining::Frozen;
+        let mut fork = network.clone();
+        fork.sem = if trains_sem { fork.sem.train() } else { fork.sem.valid() };
+        fork.dense = if stage.registration { fork.dense.train() } else { fork.dense.valid() };
+        fork.skeleton = if stage.registration { fork.skeleton.train() } else { fork.skeleton.valid() };
+
+        let Shard { batch, rotation, translation, phase } = shard;
+        let (source, target) = (batch.source, batch.target);
+        let mut terms = Terms::default();
+        let (source_skeleton, target_skeleton) = if stage.registration {
+            let output = fork.forward(&self.integration, source.clone(), target.clone(), phase);
+            for (names, branch) in [(DENSE, &output.dense), (SKELETON, &output.skeleton)] {
+                branch_terms(&mut terms, names, branch, losses.correspondence, &rotation, &translation);
+            }
+            let fused = (output.fused.rotation, output.fused.translation);
+            terms.add(
+                "fused",
+                registration_loss(fused.0, fused.1, rotation.clone(), translation.clone()),
+                1.0,
+            );
+            (output.source_skeleton, output.target_skeleton)
+        } else {
+            (fork.sem.forward(source.clone()), fork.sem.forward(target.clone()))
+        };
+        if trains_sem {
+            let (x, y) = ((source, &source_skeleton), (target, &target_skeleton));
+            skeleton_terms(&mut terms, stage.sem, losses, x, y, rotation, translation);
+        }
+        terms.finish(&fork)
+    }
+
+    fn found(&self, network: &Srrf, shard: Shard) -> Found {
+        let Shard { batch, rotation, translation, phase } = shard;
+        let output = network.forward(&self.integration, batch.source.clone(), batch.target.clone(), phase);
+        let poses: Vec<Vec<Option<Rigid>>> = vec![
+            batch.poses(&output.dense.rotation, &output.dense.translation),
+            batch.poses(&output.skeleton.rotation, &output.skeleton.translation),
+            batch.poses(&output.fused.rotation, &output.fused.translation),
+        ];
+        let posed = transform(output.source_skeleton.points, rotation, translation);
+        let target = output.target_skeleton.points;
+        // Mean Chamfer distance (unsquared, both ways) between the posed source skeleton and the target
+        // skeleton, and the root mean square distance of skeleton points from their mean.
+        let notes = vec![
+            ("skeleton_chamfer", chamfer(posed, target.clone()).into_scalar::<f64>()),
+            ("skeleton_spread", spread(target).into_scalar::<f64>()),
+        ];
+        Found { poses, notes }
+    }
+}
+
+const DENSE: [&str; 2] = ["dense", "dense_correspondence"];
+const SKELETON: [&str; 2] = ["skeleton", "skeleton_correspondence"];
+
+/// `L_reg` of a branch and its correspondence loss.
+fn branch_terms(
+    terms: &mut Terms,
+    [name, correspondence]: [&'static str; 2],
+    branch: &BranchOutput,
+    weight: f64,
+    rotation: &Tensor<3>,
+    translation: &Tensor<2>,
+) {
+    let (r, t) = (branch.rotation.clone(), branch.translation.clone());
+    terms.add(name, registration_loss(r, t, rotation.clone(), translation.clone()), 1.0);
+    let (points, matches) = (branch.source_points.clone(), branch.matches.clone());
+    terms.add(
+        correspondence,
+        correspondence_loss(points, matches, rotation.clone(), translation.clone()),
+        weight,
+    );
+}
+
+/// The losses of the skeleton module.
+fn skeleton_terms(
+    terms: &mut Terms,
+    training: SemTraining,
+    losses: &LossConfig,
+    (source, source_skeleton): (Tensor<3>, &Skeleton),
+    (target, target_skeleton): (Tensor<3>, &Skeleton),
+    rotation: Tensor<3>,
+    translation: Tensor<2>,
+) {
+    terms.add("spread", spread(target_skeleton.points.clone().detach()), 0.0);
+    if training == SemTraining::Chamfer {
+        let points = Tensor::cat(vec![source_skeleton.points.clone(), target_skeleton.points.clone()], 0);
+        terms.add("chamfer", chamfer(points, Tensor::cat(vec![source, target], 0)), 1.0);
+        return;
+    }
+    let (x, y) = ((source, source_skeleton), (target, target_skeleton));
+    let loss = skeleton_loss(&losses.skeleton, x, y, rotation, translation);
+    terms.add("sampling", loss.sampling, 0.0);
+    terms.add("point_to_sphere", loss.point_to_sphere, 0.0);
+    terms.add("radius", loss.radius, 0.0);
+    terms.add("distribution", loss.distribution, 0.0);
+    terms.add("index_match", loss.index_match, 0.0);
+    terms.add("sem", loss.total, 1.0);
+}
