@@ -23,6 +23,6 @@ pub use euler::EulerXyz;
 pub use fps::farthest_point_sampling;
 pub use neighbours::KnnIndex;
 pub use normals::estimate_normals;
-pub use register::{Branch, Register, RegisterError, Registration, Skeletons};
+pub use register::{Branch, Register, RegisterError, Registration, Skeleton, Skeletons, SoftMatch};
 pub use rigid::Rigid;
 pub use voxel::{VoxelError, point_spacing, spacing_of, voxel_downsample};

@@ -27,13 +27,33 @@ pub struct Branch {
     pub inlier_ratio: f64,
 }
 
+/// A skeleton: spheres along the middle of a shape.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Skeleton {
+    /// Centres in the coordinates of their cloud, shape `[s, 3]`.
+    pub points: Vec<[f64; 3]>,
+    /// Radii in the unit of the cloud, shape `[s]`; empty where they are not known.
+    pub radii: Vec<f64>,
+}
+
 /// Skeletons that a method extracted on its way, each in the coordinates of its cloud.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Skeletons {
-    /// Skeleton points of the source, shape `[s, 3]`.
-    pub source: Vec<[f64; 3]>,
-    /// Skeleton points of the target, shape `[s, 3]`.
-    pub target: Vec<[f64; 3]>,
+    /// Of the source.
+    pub source: Skeleton,
+    /// Of the target.
+    pub target: Skeleton,
+}
+
+/// A soft match: a point of the source, and where a method expects it in the target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SoftMatch {
+    /// In source coordinates.
+    pub source: [f64; 3],
+    /// In target coordinates.
+    pub target: [f64; 3],
+    /// Not negative; the greater, the stronger.
+    pub weight: f64,
 }
 
 /// What a method answers.
@@ -49,12 +69,21 @@ pub struct Registration {
     pub branches: Vec<Branch>,
     /// The skeletons, from methods that make them.
     pub skeletons: Option<Skeletons>,
+    /// Soft matches behind the pose, from methods that make them.
+    pub matches: Vec<SoftMatch>,
 }
 
 impl Registration {
     /// An answer without branches from a method that does not iterate.
     pub fn from_pose(target_from_source: Rigid) -> Self {
-        Self { target_from_source, converged: true, iterations: 1, branches: Vec::new(), skeletons: None }
+        Self {
+            target_from_source,
+            converged: true,
+            iterations: 1,
+            branches: Vec::new(),
+            skeletons: None,
+            matches: Vec::new(),
+        }
     }
 
     /// The answer for the source itself, where this one is for the source as `start` moved it.
@@ -63,10 +92,11 @@ impl Registration {
         for branch in &mut self.branches {
             branch.target_from_source = branch.target_from_source.compose(start);
         }
+        let back = start.inverse();
         if let Some(skeletons) = &mut self.skeletons {
-            let back = start.inverse();
-            skeletons.source.iter_mut().for_each(|p| *p = back.apply(p));
+            skeletons.source.points.iter_mut().for_each(|p| *p = back.apply(p));
         }
+        self.matches.iter_mut().for_each(|m| m.source = back.apply(&m.source));
         self
     }
 }

@@ -263,7 +263,7 @@ impl Answer {
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::{Branch, PointCloud, Register, RegisterError, Registration, Skeletons};
+    use srrf_cloud::{Branch, PointCloud, Register, RegisterError, Registration, Skeleton, Skeletons};
     use srrf_corrupt::{CorruptionKind, PairConfig, Severity};
 
     use super::*;
@@ -288,7 +288,7 @@ mod tests {
             let branch = |name, target_from_source| Branch { name, target_from_source, inlier_ratio: 0.0 };
             let branches = vec![branch("left", Rigid::identity()), branch("right", broken)];
             // Skeletons that agree under no pose but the identity.
-            let skeleton = vec![[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]];
+            let skeleton = Skeleton { points: vec![[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]], radii: Vec::new() };
             let skeletons = Some(Skeletons { source: skeleton.clone(), target: skeleton });
             Ok(Registration { branches, skeletons, ..Registration::from_pose(Rigid::identity()) })
         }

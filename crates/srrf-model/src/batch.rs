@@ -50,6 +50,11 @@ impl PairFrame {
         (Vector3::from(*point) * self.scale + self.target_mean).into()
     }
 
+    /// A length in network units, in the unit of the clouds.
+    pub fn undo_length(&self, length: f64) -> f64 {
+        length * self.scale
+    }
+
     /// A pose between the given clouds as the network sees it.
     pub fn to_network(&self, target_from_source: &Rigid) -> Rigid {
         let Rigid { rotation, translation } = target_from_source;

@@ -2,11 +2,15 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use srrf_cloud::{Branch, PointCloud, Register, RegisterError, Registration, Rigid, Skeletons};
+use srrf_cloud::{
+    Branch, PointCloud, Register, RegisterError, Registration, Rigid, Skeleton, Skeletons, SoftMatch,
+};
 
-use crate::batch::PairBatch;
+use crate::batch::{PairBatch, PairFrame};
+use crate::branch::BranchOutput;
 use crate::geometry::even_subsample;
 use crate::integration::IntegrationConfig;
+use crate::sem;
 use crate::srrf::Srrf;
 use crate::weights::LoadedModel;
 
@@ -47,10 +51,13 @@ impl SrrfRegister {
         let fused = batch.poses(&output.fused.rotation, &output.fused.translation);
         let dense = batch.poses(&output.dense.rotation, &output.dense.translation);
         let skeleton = batch.poses(&output.skeleton.rotation, &output.skeleton.translation);
-        let source_skeletons = cloud_points(&output.source_skeleton.points);
-        let target_skeletons = cloud_points(&output.target_skeleton.points);
-        (0..pairs.len())
-            .map(|i| {
+        let source_skeletons = skeletons(&output.source_skeleton, &batch.frames, PairFrame::undo_source);
+        let target_skeletons = skeletons(&output.target_skeleton, &batch.frames, PairFrame::undo_target);
+        let matches = soft_matches(&output.dense, &batch.frames);
+        let found = source_skeletons.into_iter().zip(target_skeletons).zip(matches);
+        found
+            .enumerate()
+            .map(|(i, ((source, target), matches))| {
                 let branch = |name, pose: &[Option<Rigid>], ratio: &[f64]| {
                     Some(Branch { name, target_from_source: pose[i]?, inlier_ratio: ratio[i] })
                 };
@@ -58,14 +65,10 @@ impl SrrfRegister {
                     branch("dense", &dense, &output.fused.dense_inlier_ratio)?,
                     branch("skeleton", &skeleton, &output.fused.skeleton_inlier_ratio)?,
                 ];
-                let frame = &batch.frames[i];
-                let skeletons = Skeletons {
-                    source: source_skeletons[i].iter().map(|p| frame.undo_source(p)).collect(),
-                    target: target_skeletons[i].iter().map(|p| frame.undo_target(p)).collect(),
-                };
                 Some(Registration {
                     branches,
-                    skeletons: Some(skeletons),
+                    skeletons: Some(Skeletons { source, target }),
+                    matches,
                     ..Registration::from_pose(fused[i]?)
                 })
             })
@@ -113,6 +116,40 @@ impl SrrfRegister {
         }
         found.ok_or_else(|| RegisterError::NoPose("no pass was made".into()))
     }
+}
+
+/// The skeletons of a batch in the coordinates of their clouds.
+fn skeletons(
+    found: &sem::Skeleton,
+    frames: &[PairFrame],
+    undo: fn(&PairFrame, &[f64; 3]) -> [f64; 3],
+) -> Vec<Skeleton> {
+    let [_, s, _] = found.points.dims();
+    let radii = found.radii.try_to_vec_as::<f64>().unwrap_or_default();
+    let clouds = cloud_points(&found.points).into_iter().zip(radii.chunks(s.max(1)));
+    let back = |(frame, (points, radii)): (&PairFrame, (Vec<[f64; 3]>, &[f64]))| Skeleton {
+        points: points.iter().map(|p| undo(frame, p)).collect(),
+        radii: radii.iter().map(|r| frame.undo_length(*r)).collect(),
+    };
+    frames.iter().zip(clouds).map(back).collect()
+}
+
+/// The soft matches `(x_i, yhat_i)` of a batch; the weight is the greatest probability in `m(x_i, Y)`, which is
+/// 1 where `yhat_i` is one target point.
+fn soft_matches(branch: &BranchOutput, frames: &[PairFrame]) -> Vec<Vec<SoftMatch>> {
+    let [_, n, _] = branch.matches.dims();
+    let weights = branch.probabilities.clone().max_dim(2).try_to_vec_as::<f64>().unwrap_or_default();
+    let (sources, targets) = (cloud_points(&branch.source_points), cloud_points(&branch.matches));
+    let pairs = sources.iter().zip(&targets).zip(weights.chunks(n.max(1)));
+    let of_pair = |(frame, ((source, target), weights)): (&PairFrame, ((&Vec<_>, &Vec<_>), &[f64]))| {
+        let one = |((x, y), weight): ((&[f64; 3], &[f64; 3]), &f64)| SoftMatch {
+            source: frame.undo_source(x),
+            target: frame.undo_target(y),
+            weight: *weight,
+        };
+        source.iter().zip(target).zip(weights).map(one).collect()
+    };
+    frames.iter().zip(pairs).map(of_pair).collect()
 }
 
 /// Points of each cloud of a batch, `[batch, points, 3]`, in `f64`.

@@ -143,17 +143,20 @@ fn answers_hold_both_branches() {
 #[test]
 fn skeletons_come_in_the_coordinates_of_their_clouds() {
     let (source, target) = (placed(&cloud(25, 61), 40.0, UTM), cloud(26, 61));
-    let skeletons = network().register(&source, &target).unwrap().skeletons.unwrap();
+    let answer = network().register(&source, &target).unwrap();
+    let skeletons = answer.skeletons.unwrap();
     for (cloud, skeleton) in [(&source, skeletons.source), (&target, skeletons.target)] {
-        assert_eq!(skeleton.len(), 19);
-        let slack = 1e-6 * cloud.to_unit_sphere().1.radius;
+        assert_eq!((skeleton.points.len(), skeleton.radii.len()), (19, 19));
+        let radius = cloud.to_unit_sphere().1.radius;
+        let slack = 1e-6 * radius;
+        assert!(skeleton.radii.iter().all(|r| (0.0..radius).contains(r)), "lengths of the cloud");
         for axis in 0..3 {
             let of = |points: &[[f64; 3]]| {
                 let values = points.iter().map(|p| p[axis]);
                 (values.clone().fold(f64::INFINITY, f64::min), values.fold(f64::NEG_INFINITY, f64::max))
             };
             let (low, high) = of(cloud.points());
-            let (least, most) = of(&skeleton);
+            let (least, most) = of(&skeleton.points);
             assert!(low - slack <= least && most <= high + slack, "inside the box of the cloud");
             assert!(most > least, "and not one point");
         }

@@ -48,6 +48,7 @@ impl<R: Register> Refined<R> {
             iterations: found.iterations + refined.iterations,
             branches,
             skeletons: found.skeletons,
+            matches: found.matches,
         })
     }
 }

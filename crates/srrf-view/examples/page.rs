@@ -13,8 +13,8 @@ use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use srrf_cloud::shapes::ProceduralShapes;
 use srrf_cloud::source::ShapeSource;
-use srrf_cloud::{EulerXyz, KnnIndex, PointCloud, Rigid, farthest_point_sampling};
-use srrf_view::{Match, Number, Page, Pair, Pose, Skeleton};
+use srrf_cloud::{EulerXyz, KnnIndex, PointCloud, Rigid, Skeleton, SoftMatch, farthest_point_sampling};
+use srrf_view::{Number, Page, Pair, Pose};
 
 const USAGE: &str = "usage: page OUT.html [--points N] [--pairs N] [--offset X,Y,Z]";
 
@@ -74,7 +74,7 @@ fn pair<'a>(
     let matches = matched.iter().map(|&i| {
         let from = source.points()[i];
         let (nearest, squared) = index.nearest(&truth.apply(&from));
-        Match { source: from, target: target.points()[nearest], weight: (-squared / 0.01).exp() }
+        SoftMatch { source: from, target: target.points()[nearest], weight: (-squared / 0.01).exp() }
     });
     let skeletons = (skeleton(source)?, skeleton(target)?);
     Ok(Pair::new(name, source, target)

@@ -6,13 +6,13 @@
 
 use nalgebra::Vector3;
 use serde::Serialize;
-use srrf_cloud::{PointCloud, Rigid};
+use srrf_cloud::{PointCloud, Rigid, Skeleton, SoftMatch};
 
 use crate::describe::describe;
 use crate::quantise::{QuantisedPoints, QuantisedValues, quantise_points, quantise_values};
 use crate::residual::{Distances, ResidualSummary, Residuals};
 use crate::sample::even_indices;
-use crate::{MATCHES_PER_PAIR, Match, Number, PAGE_BYTES, POINTS_PER_CLOUD, Pair, Pose, Skeleton, Up};
+use crate::{MATCHES_PER_PAIR, Number, PAGE_BYTES, POINTS_PER_CLOUD, Pair, Pose, Up};
 
 #[derive(Debug, Serialize)]
 pub(crate) struct EncodedPair {
@@ -187,10 +187,10 @@ fn encode_skeleton(
 }
 
 /// The strongest finite matches, strongest first; of equals those that came first.
-fn encode_matches(matches: &[Match], frames: &Frames) -> Vec<EncodedMatch> {
+fn encode_matches(matches: &[SoftMatch], frames: &Frames) -> Vec<EncodedMatch> {
     let finite =
-        |m: &&Match| m.source.iter().chain(&m.target).chain([&m.weight]).all(|value| value.is_finite());
-    let mut strongest: Vec<&Match> = matches.iter().filter(finite).collect();
+        |m: &&SoftMatch| m.source.iter().chain(&m.target).chain([&m.weight]).all(|value| value.is_finite());
+    let mut strongest: Vec<&SoftMatch> = matches.iter().filter(finite).collect();
     strongest.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     strongest.truncate(MATCHES_PER_PAIR);
     let encoded = strongest.into_iter().map(|m| EncodedMatch {

@@ -48,7 +48,7 @@ pub use bundle::viewer_script;
 pub use html::viewer_element;
 pub use number::Number;
 pub use page::{Page, ViewError};
-pub use pair::{Match, Pair, Pose, Skeleton, Up};
+pub use pair::{Pair, Pose, Up};
 
 /// Most points of one cloud that a page draws. Phones turn two clouds of this size smoothly, and a
 /// page of one pair stays under 4 MB.

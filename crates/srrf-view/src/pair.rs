@@ -1,6 +1,6 @@
 //! [`Pair`]: two clouds and what was found between them.
 
-use srrf_cloud::{PointCloud, Registration, Rigid};
+use srrf_cloud::{PointCloud, Registration, Rigid, Skeleton, SoftMatch};
 
 use crate::Number;
 
@@ -27,27 +27,6 @@ impl Pose {
     }
 }
 
-/// A skeleton: spheres along the middle of a shape.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Skeleton {
-    /// Centres in the coordinates of their cloud, shape `[s, 3]`.
-    pub points: Vec<[f64; 3]>,
-    /// Radii in the unit of the clouds, shape `[s]`; empty if they are not known, which draws small
-    /// spheres.
-    pub radii: Vec<f64>,
-}
-
-/// A soft match: a point of the source and where the method expects it in the target.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Match {
-    /// In source coordinates.
-    pub source: [f64; 3],
-    /// In target coordinates.
-    pub target: [f64; 3],
-    /// Not negative; the greater, the stronger.
-    pub weight: f64,
-}
-
 /// Which axis points up on the screen at first. The reader can change it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Up {
@@ -67,7 +46,7 @@ pub struct Pair<'a> {
     pub(crate) before: Pose,
     pub(crate) poses: Vec<Pose>,
     pub(crate) skeletons: Option<[Skeleton; 2]>,
-    pub(crate) matches: Vec<Match>,
+    pub(crate) matches: Vec<SoftMatch>,
     pub(crate) numbers: Vec<Number>,
     pub(crate) warnings: Vec<String>,
     pub(crate) unit: String,
@@ -107,8 +86,8 @@ impl<'a> Pair<'a> {
         self
     }
 
-    /// The answer of a method: its pose under the name `result`, its branches under theirs, and its
-    /// skeletons (without radii).
+    /// The answer of a method: its pose under the name `result`, its branches under theirs, its
+    /// skeletons and its soft matches.
     #[must_use]
     pub fn registration(mut self, registration: &Registration) -> Self {
         self.poses.push(Pose::new("result", registration.target_from_source));
@@ -118,11 +97,9 @@ impl<'a> Pair<'a> {
                     .help("share of the branch's correspondences that agree with its pose"),
             )
         }));
+        self.matches.extend(registration.matches.iter().copied());
         match &registration.skeletons {
-            Some(both) => {
-                let skeleton = |points: &[[f64; 3]]| Skeleton { points: points.to_vec(), radii: Vec::new() };
-                self.skeletons(skeleton(&both.source), skeleton(&both.target))
-            }
+            Some(both) => self.skeletons(both.source.clone(), both.target.clone()),
             None => self,
         }
     }
@@ -136,7 +113,7 @@ impl<'a> Pair<'a> {
 
     /// Matches, in any order; the [`crate::MATCHES_PER_PAIR`] strongest are drawn.
     #[must_use]
-    pub fn matches(mut self, matches: impl IntoIterator<Item = Match>) -> Self {
+    pub fn matches(mut self, matches: impl IntoIterator<Item = SoftMatch>) -> Self {
         self.matches.extend(matches);
         self
     }
@@ -185,8 +162,13 @@ mod tests {
             target_from_source: Rigid::identity(),
             inlier_ratio: 0.25,
         });
-        answer.skeletons = Some(Skeletons { source: vec![[1.0; 3]], target: vec![[2.0; 3], [3.0; 3]] });
+        answer.skeletons = Some(Skeletons {
+            source: Skeleton { points: vec![[1.0; 3]], radii: vec![0.5] },
+            target: Skeleton { points: vec![[2.0; 3], [3.0; 3]], radii: Vec::new() },
+        });
+        answer.matches.push(SoftMatch { source: [0.0; 3], target: [2.0; 3], weight: 0.75 });
         let pair = Pair::new("a", &cloud, &cloud).registration(&answer);
+        assert_eq!(pair.matches, answer.matches);
         assert_eq!(pair.poses.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), ["result", "dense"]);
         assert_eq!(pair.poses[1].numbers[0].value, "0.25");
         assert_eq!(pair.skeletons.unwrap().map(|s| s.points.len()), [1, 2]);

@@ -3,7 +3,7 @@
 use nalgebra::{Rotation3, UnitQuaternion};
 use serde::Serialize;
 use serde_json::{Value, json};
-use srrf_cloud::{Branch, EulerXyz, Rigid, Skeletons};
+use srrf_cloud::{Branch, EulerXyz, Rigid, Skeletons, SoftMatch};
 use srrf_refine::{Evidence, Refinement};
 
 use crate::options::Method;
@@ -20,6 +20,8 @@ pub struct CoarsePose {
     pub lambda: f64,
     /// Skeletons, in input coordinates.
     pub skeletons: Option<Skeletons>,
+    /// Soft matches of the dense branch, in input coordinates.
+    pub matches: Vec<SoftMatch>,
 }
 
 /// Numbers of points.

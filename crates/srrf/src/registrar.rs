@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 use srrf_baselines::{FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
-use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid};
+use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, Skeletons};
 use srrf_refine::{Evidence, RefineError, RefineTarget, Refinement};
 
 use crate::frame::{Centred, from_input, to_input};
@@ -264,15 +264,19 @@ impl Registrar {
         let gamma = |name: &str| branches.iter().find(|b| b.name == name).map_or(0.0, |b| b.inlier_ratio);
         let (dense, skeleton) = (gamma("dense"), gamma("skeleton"));
         let lambda = if dense + skeleton > 0.0 { dense / (dense + skeleton) } else { 0.5 };
+        let shift = |p: &mut [f64; 3], centre: &nalgebra::Vector3<f64>| (0..3).for_each(|c| p[c] += centre[c]);
         let mut skeletons = found.skeletons.clone();
-        if let Some(skeletons) = &mut skeletons {
-            let shift = |points: &mut Vec<[f64; 3]>, centre: &nalgebra::Vector3<f64>| {
-                points.iter_mut().for_each(|p| (0..3).for_each(|c| p[c] += centre[c]));
-            };
-            shift(&mut skeletons.source, &source.centre);
-            shift(&mut skeletons.target, &target.centred.centre);
+        if let Some(Skeletons { source: ours, target: theirs }) = &mut skeletons {
+            ours.points.iter_mut().for_each(|p| shift(p, &source.centre));
+            theirs.points.iter_mut().for_each(|p| shift(p, &target.centred.centre));
         }
-        CoarsePose { target_from_source: input(&found.target_from_source), branches, lambda, skeletons }
+        let mut matches = found.matches.clone();
+        for m in &mut matches {
+            shift(&mut m.source, &source.centre);
+            shift(&mut m.target, &target.centred.centre);
+        }
+        let target_from_source = input(&found.target_from_source);
+        CoarsePose { target_from_source, branches, lambda, skeletons, matches }
     }
 }
 

@@ -46,6 +46,14 @@ fn map_coordinates_keep_their_last_millimetre() {
     assert!(moved.points().iter().zip(target.points()).map(off).fold(0.0, f64::max) < 1e-3);
     let page = scene.read("page.html");
     assert!(page.starts_with("<!doctype html>") && page.contains("source.ply to target.ply"));
+    let shown = page.split("application/json\">").nth(1).unwrap().split("</script").next().unwrap();
+    let shown: Value = serde_json::from_str(shown).unwrap();
+    let pair = &shown["pairs"][0];
+    for side in 0..2 {
+        let (points, radii) = (&pair["skeletons"][side]["points"], &pair["skeletons"][side]["radii"]);
+        assert_eq!((points.as_array().unwrap().len(), radii.as_array().unwrap().len()), (64, 64));
+    }
+    assert!(!pair["matches"].as_array().unwrap().is_empty());
 }
 
 #[test]

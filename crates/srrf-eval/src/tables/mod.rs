@@ -243,7 +243,7 @@ impl Stage<'_> {
         // As many points as the skeletons of the network have, so that only the choice differs.
         let first = clean.pair(0, 0)?.pair;
         let found = skeletons.register(&first.source, &first.target).ok();
-        let count = found.and_then(|f| f.skeletons).map_or(64, |s| s.source.len());
+        let count = found.and_then(|f| f.skeletons).map_or(64, |s| s.source.points.len());
         Ok(SampledPairs::new(clean, skeletons, count, self.options.seed))
     }
 }

@@ -82,8 +82,8 @@ fn what_cannot_be_drawn_becomes_a_warning() {
 #[test]
 fn the_strongest_matches_are_kept_in_order() {
     let (source, target) = clouds(5);
-    let one = |i: usize, weight| Match { source: source.points()[i], target: target.points()[i], weight };
-    let mut matches: Vec<Match> = (0..MATCHES_PER_PAIR).map(|i| one(i % 5, 0.001 * i as f64)).collect();
+    let one = |i: usize, weight| SoftMatch { source: source.points()[i], target: target.points()[i], weight };
+    let mut matches: Vec<SoftMatch> = (0..MATCHES_PER_PAIR).map(|i| one(i % 5, 0.001 * i as f64)).collect();
     matches.push(one(2, 5.0));
     matches.push(one(3, f64::NAN));
     let encoded = encode(&Pair::new("p", &source, &target).matches(matches), 1);

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::{Args, ValueEnum};
 use srrf::Outcome;
 use srrf_cloud::Rigid;
-use srrf_view::{Number, Page, Pair, Pose, Skeleton, Up};
+use srrf_view::{Number, Page, Pair, Pose, Up};
 
 use super::files::Input;
 use super::say::count;
@@ -103,9 +103,9 @@ pub fn of_outcome(
             pair = pair.pose(Pose::new(name, branch.target_from_source).number(inliers(branch.inlier_ratio)));
         }
         if let Some(skeletons) = &network.skeletons {
-            let skeleton = |points: &[[f64; 3]]| Skeleton { points: points.to_vec(), radii: Vec::new() };
-            pair = pair.skeletons(skeleton(&skeletons.source), skeleton(&skeletons.target));
+            pair = pair.skeletons(skeletons.source.clone(), skeletons.target.clone());
         }
+        pair = pair.matches(network.matches.iter().copied());
     }
     // Those about points left out are there already.
     for warning in outcome.warnings.iter().filter(|w| !w.ends_with("left out.")) {

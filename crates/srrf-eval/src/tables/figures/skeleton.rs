@@ -141,9 +141,9 @@ pub(crate) fn agreement(networks: &[(&str, &dyn Register)], pairs: &[(String, Pa
         grid.dots(&view, &thinned(pair.source.transformed(truth).points(), 400), BLUE, 1.4);
         for (at, (network, register)) in networks.iter().enumerate() {
             let skeletons = register.register(&pair.source, &pair.target).ok()?.skeletons?;
-            let moved: Vec<[f64; 3]> = skeletons.source.iter().map(|p| truth.apply(p)).collect();
+            let moved: Vec<[f64; 3]> = skeletons.source.points.iter().map(|p| truth.apply(p)).collect();
             grid.panel(left + 1 + at, row, network);
-            grid.dots(&view, &skeletons.target, GREEN, 4.5);
+            grid.dots(&view, &skeletons.target.points, GREEN, 4.5);
             grid.dots(&view, &moved, RED, 3.0);
         }
     }
