@@ -5,7 +5,7 @@ use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid};
 use srrf_refine::{RefineConfig, RefineTarget};
 
 use crate::correspond::correspond;
-use crate::ransac::{Hypothesis, Search, ransac};
+use crate::ransac::{Search, ransac};
 
 /// Settings of [`FpfhRansac`]. Lengths are in voxels, and the voxel follows from the clouds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -62,14 +62,13 @@ impl FpfhRansac {
     pub fn new(config: FpfhRansacConfig) -> Self {
         Self { config }
     }
-}
 
-impl Register for FpfhRansac {
-    fn name(&self) -> &str {
-        "fpfh-ransac"
-    }
-
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+    /// The poses on which most matches agree, best first, without refinement: at most
+    /// [`FpfhRansacConfig::hypotheses`].
+    ///
+    /// # Errors
+    /// [`RegisterError`] for clouds that cannot be used, and where no sample was consistent.
+    pub fn hypotheses(&self, source: &PointCloud, target: &PointCloud) -> Result<Hypotheses, RegisterError> {
         let config = &self.config;
         let matches = correspond(source, target, config.points, config.feature_voxels, 30)?;
         let search = Search {
@@ -81,33 +80,42 @@ impl Register for FpfhRansac {
             seed: config.seed,
         };
         let (found, drawn) = ransac(&matches, &search);
-        finish(&found, drawn, matches.pairs.len(), source, target, config.refine.as_ref())
+        if found.is_empty() {
+            return Err(RegisterError::NoPose(format!(
+                "none of {drawn} samples of {} matches was consistent; the clouds may not overlap, or \
+                 `distance_voxels` is too small",
+                matches.pairs.len()
+            )));
+        }
+        Ok(Hypotheses { poses: found.iter().map(|h| h.pose).collect(), drawn })
     }
 }
 
-/// The best hypothesis, refined.
-fn finish(
-    found: &[Hypothesis],
-    drawn: usize,
-    matches: usize,
-    source: &PointCloud,
-    target: &PointCloud,
-    refine: Option<&RefineConfig>,
-) -> Result<Registration, RegisterError> {
-    let Some(best) = found.first() else {
-        return Err(RegisterError::NoPose(format!(
-            "none of {drawn} samples of {matches} matches was consistent; the clouds may not overlap, or \
-             `distance_voxels` is too small"
-        )));
-    };
-    let Some(config) = refine else {
-        return Ok(Registration { iterations: drawn, ..Registration::from_pose(best.pose) });
-    };
-    let starts: Vec<(&str, Rigid)> = found.iter().map(|h| ("hypothesis", h.pose)).collect();
-    let refined = RefineTarget::new(target, config)?.refine(source, &starts)?;
-    Ok(Registration {
-        converged: refined.converged,
-        iterations: drawn + refined.iterations,
-        ..Registration::from_pose(refined.target_from_source)
-    })
+/// What [`FpfhRansac::hypotheses`] found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hypotheses {
+    /// Poses that map the source onto the target, best first; at least one.
+    pub poses: Vec<Rigid>,
+    /// Samples drawn.
+    pub drawn: usize,
+}
+
+impl Register for FpfhRansac {
+    fn name(&self) -> &str {
+        "fpfh-ransac"
+    }
+
+    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+        let found = self.hypotheses(source, target)?;
+        let Some(config) = &self.config.refine else {
+            return Ok(Registration { iterations: found.drawn, ..Registration::from_pose(found.poses[0]) });
+        };
+        let starts: Vec<(&str, Rigid)> = found.poses.iter().map(|pose| ("hypothesis", *pose)).collect();
+        let refined = RefineTarget::new(target, config)?.refine(source, &starts)?;
+        Ok(Registration {
+            converged: refined.converged,
+            iterations: found.drawn + refined.iterations,
+            ..Registration::from_pose(refined.target_from_source)
+        })
+    }
 }

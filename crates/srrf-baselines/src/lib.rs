@@ -44,7 +44,7 @@ mod se3;
 pub use dcp::{Dcp, DcpConfig, DcpLosses, DcpVersion};
 pub use equi_gspr::{EquiGspr, EquiGsprConfig, EquiGsprLosses, PutativeMatches};
 pub use fgr::{Fgr, FgrConfig};
-pub use fpfh_ransac::{FpfhRansac, FpfhRansacConfig};
+pub use fpfh_ransac::{FpfhRansac, FpfhRansacConfig, Hypotheses};
 pub use icp::{Icp, IcpConfig};
 pub use icp_plane::{IcpPlane, IcpPlaneConfig};
 pub use icp_robust::{IcpRobust, IcpRobustConfig};

@@ -44,6 +44,14 @@ impl SrrfRegister {
         }
     }
 
+    /// A network for a quick look: one pass, with at most `tokens` tokens in the dense branch.
+    pub fn glance(mut loaded: LoadedModel, device: Device, tokens: usize) -> Self {
+        if loaded.config.dense.tokens == 0 || loaded.config.dense.tokens > tokens {
+            loaded.model.dense = loaded.model.dense.with_tokens(tokens);
+        }
+        Self { passes: 1, ..Self::new(loaded, device) }
+    }
+
     /// One pass over pairs that all have `points` points a cloud.
     fn pass(&self, pairs: &[(&PointCloud, &PointCloud)]) -> Vec<Option<Registration>> {
         let Some(batch) = PairBatch::new(pairs, &self.device) else { return vec![None; pairs.len()] };

@@ -63,7 +63,7 @@ pub enum WeightsError {
 }
 
 /// A network with what its file says about it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct LoadedModel<C: NetworkConfig = SrrfConfig> {
     /// The network, on the device, without gradients.
     pub model: C::Network,

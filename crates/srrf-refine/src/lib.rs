@@ -31,10 +31,12 @@ mod register;
 mod robust;
 mod soft;
 mod solve;
+mod target;
 
 pub use config::{Metric, RefineConfig, RefineError};
 pub use deformation::ResidualStructure;
 pub use evidence::Evidence;
-pub use refine::{RefineTarget, Refinement, StartSupport, Verdict, refine};
+pub use refine::{Refinement, StartSupport, Verdict};
 pub use register::Refined;
 pub use solve::{Match, NormalEquations};
+pub use target::{RefineSource, RefineTarget, refine};

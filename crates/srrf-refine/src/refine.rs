@@ -1,9 +1,10 @@
-//! [`refine`]: starts in, one refined pose with its evidence out.
+//! [`Refinement`]: the best of several starts, refined, with the evidence for it.
 
 use std::fmt;
 
+use rayon::prelude::*;
 use serde::Serialize;
-use srrf_cloud::{PointCloud, Rigid};
+use srrf_cloud::Rigid;
 
 use crate::deformation::{ResidualStructure, residual_structure};
 use crate::evidence::{Evidence, evidence};
@@ -51,11 +52,13 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// A start after its short run; a single start has none.
+/// A start after its short run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StartSupport {
     /// Its name.
     pub name: String,
+    /// The pose as it was given.
+    pub given: Rigid,
     /// Symmetric robust score after the short run, in [0, 1]: the mean over both clouds of
     /// `s^2 / (s^2 + r^2)`, `r` the distance to the other cloud, for `s` of 1, 0.3 and 0.1 point spacings.
     pub support: f64,
@@ -88,93 +91,36 @@ pub struct Refinement {
     pub starts: Vec<StartSupport>,
 }
 
-/// A target made ready, to refine the poses of many sources.
-#[derive(Debug)]
-pub struct RefineTarget {
-    config: RefineConfig,
-    prepared: Prepared,
-}
-
-impl RefineTarget {
-    /// Centres, thins and indexes the target and estimates its normals.
-    ///
-    /// # Errors
-    /// [`RefineError::Config`], and [`RefineError::Target`] for a cloud that determines no rotation.
-    pub fn new(target: &PointCloud, config: &RefineConfig) -> Result<Self, RefineError> {
-        config.validate()?;
-        let prepared = Prepared::new(target, config).map_err(RefineError::Target)?;
-        Ok(Self { config: *config, prepared })
-    }
-
-    /// The settings.
-    pub fn config(&self) -> &RefineConfig {
-        &self.config
-    }
-
-    /// What speaks for a pose as it is, without refinement.
-    ///
-    /// # Errors
-    /// [`RefineError::Source`] for a cloud that determines no rotation.
-    pub fn evidence(&self, source: &PointCloud, pose: &Rigid) -> Result<Evidence, RefineError> {
-        let source = Prepared::new(source, &self.config).map_err(RefineError::Source)?;
-        Ok(evidence(&source, &self.prepared, pose))
-    }
-
-    /// Refines the best of `starts`: named poses that map `source` near the target.
-    ///
-    /// # Errors
-    /// [`RefineError::Source`] for a cloud that determines no rotation, [`RefineError::NoStart`] without
-    /// starts, [`RefineError::Start`] for one that is not finite.
-    pub fn refine(&self, source: &PointCloud, starts: &[(&str, Rigid)]) -> Result<Refinement, RefineError> {
-        let finite = |p: &Rigid| p.rotation.iter().chain(p.translation.iter()).all(|v| v.is_finite());
-        if let Some((name, _)) = starts.iter().find(|(_, pose)| !finite(pose)) {
-            return Err(RefineError::Start((*name).to_owned()));
-        }
-        let source = Prepared::new(source, &self.config).map_err(RefineError::Source)?;
-        Run { source: &source, target: &self.prepared, config: &self.config }.refine(starts)
-    }
-}
-
-/// Refines the best of `starts`: named poses that map `source` near `target`.
-///
-/// Several starts get a short run each, on few points; the best supported one gets the full run: a
-/// robust stage (nearest neighbours both ways, Geman-McClure, shrinking scale), coarse to fine for
-/// large clouds, then a soft stage for small ones. Then the residuals are looked at, and the answer is
-/// the refined pose, its cautious variant or the start ([`Verdict`]).
-///
-/// The answer does not depend on the number of threads, and on the order of the points only by
-/// rounding.
-///
-/// # Errors
-/// [`RefineError`] for clouds, settings or starts that cannot be used.
-pub fn refine(
-    source: &PointCloud,
-    target: &PointCloud,
-    starts: &[(&str, Rigid)],
-    config: &RefineConfig,
-) -> Result<Refinement, RefineError> {
-    RefineTarget::new(target, config)?.refine(source, starts)
-}
-
-struct Run<'a> {
-    source: &'a Prepared,
-    target: &'a Prepared,
-    config: &'a RefineConfig,
+/// One source, one target.
+pub(crate) struct Run<'a> {
+    pub source: &'a Prepared,
+    pub target: &'a Prepared,
+    pub config: &'a RefineConfig,
 }
 
 impl Run<'_> {
-    fn refine(&self, starts: &[(&str, Rigid)]) -> Result<Refinement, RefineError> {
-        let local: Vec<Rigid> = starts.iter().map(|(_, p)| to_local(p, self.source, self.target)).collect();
-        let short: Vec<(Rigid, f64)> = match &local[..] {
-            [only] => vec![(*only, self.support(only))],
-            several => several.iter().map(|pose| self.short_run(pose)).collect(),
+    /// Short runs of all starts, or just the support of a single one.
+    pub fn shortlist(&self, starts: &[(&str, Rigid)]) -> Vec<StartSupport> {
+        let run = |(name, given): &(&str, Rigid), short: bool| {
+            let local = to_local(given, self.source, self.target);
+            let (pose, support) = if short { self.short_run(&local) } else { (local, self.support(&local)) };
+            let target_from_source = if short { to_global(&pose, self.source, self.target) } else { *given };
+            StartSupport { name: (*name).to_owned(), given: *given, support, target_from_source }
         };
+        match starts {
+            [only] => vec![run(only, false)],
+            several => several.par_iter().map(|start| run(start, true)).collect(),
+        }
+    }
+
+    /// The full run of the best of `starts`, and what to make of it.
+    pub fn finish(&self, starts: &[StartSupport]) -> Result<Refinement, RefineError> {
         // The first of equals wins.
-        let best = (0..short.len()).reduce(|a, b| if short[b].1 > short[a].1 { b } else { a });
+        let best = starts.iter().reduce(|a, b| if b.support > a.support { b } else { a });
         let Some(best) = best else { return Err(RefineError::NoStart) };
 
-        let start = local[best];
-        let mut stage = self.full_run(&short[best].0);
+        let start = to_local(&best.given, self.source, self.target);
+        let mut stage = self.full_run(&to_local(&best.target_from_source, self.source, self.target));
         let residuals = residual_structure(self.source.coarse(), self.target.coarse(), &stage.pose);
         let mut verdict = Verdict::Rigid;
         let mut support = self.support(&stage.pose);
@@ -197,12 +143,12 @@ impl Run<'_> {
             support = unrefined;
         }
         let answer = match verdict {
-            Verdict::Unsupported => starts[best].1,
+            Verdict::Unsupported => best.given,
             _ => to_global(&stage.pose, self.source, self.target),
         };
         Ok(Refinement {
             target_from_source: answer,
-            start: starts[best].0.to_owned(),
+            start: best.name.clone(),
             kept: verdict != Verdict::Unsupported,
             verdict,
             converged: stage.converged,
@@ -210,15 +156,7 @@ impl Run<'_> {
             support,
             evidence: evidence(self.source, self.target, &answer),
             residuals,
-            starts: starts
-                .iter()
-                .zip(&short)
-                .map(|((name, _), (pose, support))| StartSupport {
-                    name: (*name).to_owned(),
-                    support: *support,
-                    target_from_source: to_global(pose, self.source, self.target),
-                })
-                .collect(),
+            starts: starts.to_vec(),
         })
     }
 

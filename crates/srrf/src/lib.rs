@@ -27,6 +27,7 @@ mod options;
 mod outcome;
 mod probability;
 mod registrar;
+mod search;
 mod skeleton;
 mod starts;
 

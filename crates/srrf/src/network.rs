@@ -8,11 +8,14 @@ use srrf_model::{SrrfRegister, embedded};
 
 /// Points of the cloud that the network chooses its 1,024 from: enough to look evenly over a scan.
 const THINNED: usize = 8192;
+/// Tokens of the dense branch where the network only glances at a pair.
+const GLANCE_TOKENS: usize = 128;
 
 /// A loaded network.
 #[derive(Debug)]
 pub struct Network {
     register: SrrfRegister,
+    glance: SrrfRegister,
     /// Name of the weights.
     pub name: String,
     /// SHA-256 of the weights.
@@ -28,7 +31,8 @@ impl Network {
         let loaded = open(from, device)?;
         let device = srrf_model::device(device).map_err(|e| e.to_string())?;
         let (name, sha256) = (loaded.name.clone(), loaded.sha256.clone());
-        Ok(Self { register: SrrfRegister::new(loaded, device), name, sha256 })
+        let glance = SrrfRegister::glance(loaded.clone(), device.clone(), GLANCE_TOKENS);
+        Ok(Self { register: SrrfRegister::new(loaded, device), glance, name, sha256 })
     }
 
     /// The network's poses after `start` has moved the source.
@@ -42,6 +46,19 @@ impl Network {
         start: &Rigid,
     ) -> Result<Registration, RegisterError> {
         Ok(self.register.register(&source.transformed(start), target)?.after(start))
+    }
+
+    /// As [`Network::look_from`], faster and less exact: one pass on fewer tokens. It is for looking around.
+    ///
+    /// # Errors
+    /// As [`Network::look_from`].
+    pub fn glance_from(
+        &self,
+        source: &PointCloud,
+        target: &PointCloud,
+        start: &Rigid,
+    ) -> Result<Registration, RegisterError> {
+        Ok(self.glance.register(&source.transformed(start), target)?.after(start))
     }
 }
 

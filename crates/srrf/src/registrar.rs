@@ -5,13 +5,14 @@ use std::time::Instant;
 use rayon::prelude::*;
 use srrf_baselines::{FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, Skeletons};
-use srrf_refine::{Evidence, RefineError, RefineTarget, Refinement};
+use srrf_refine::{RefineError, RefineTarget};
 
 use crate::frame::{Centred, from_input, to_input};
 use crate::network::{Network, thinned};
 use crate::options::{Method, Options, RotationRange};
 use crate::outcome::{CoarsePose, Outcome, PointCounts, StageTime};
 use crate::probability::{Features, Logistic};
+use crate::search::{Search, Start};
 use crate::starts::{cube_rotations, turned};
 
 /// With this probability after the first round of starts, no second one is made.
@@ -53,19 +54,6 @@ pub struct Target {
     refine: RefineTarget,
     points: usize,
     seconds: f64,
-}
-
-/// A pose between the centred clouds, and the start that it is.
-type Start = (String, Rigid);
-
-/// What a round of starts came to.
-struct Round {
-    pose: Rigid,
-    start: String,
-    refinement: Option<Refinement>,
-    evidence: Evidence,
-    features: Features,
-    probability: f64,
 }
 
 impl Registrar {
@@ -126,9 +114,11 @@ impl Registrar {
         let thin = thinned(&centred.cloud);
         let given = self.options.given.unwrap_or_else(Rigid::identity);
         let given = from_input(&given, &centred, &target.centred);
+        let refine = target.refine.source(&centred.cloud).map_err(Error::Refine)?;
+        let mut search = Search::new(&target.refine, refine, self.options.refine.is_some());
         clock.lap("prepare source");
 
-        // The first round: one look of the network, FPFH with RANSAC, the given pose.
+        // The first round: a look of the network, FPFH with RANSAC, the given pose.
         let mut warnings = Vec::new();
         let mut network = None;
         let mut starts: Vec<Start> = Vec::new();
@@ -146,7 +136,7 @@ impl Registrar {
         match self.options.method {
             Method::Auto | Method::FpfhRansac => {
                 match self.global(&centred.cloud, &target.centred.cloud) {
-                    Ok(pose) => starts.push(("fpfh-ransac".to_owned(), pose)),
+                    Ok(poses) => starts.extend(poses),
                     Err(e) => warnings.push(format!("FPFH with RANSAC found no pose: {e}.")),
                 }
                 clock.lap("fpfh-ransac");
@@ -162,40 +152,46 @@ impl Registrar {
         if matches!(self.options.method, Method::Given | Method::Auto) {
             starts.push(("given".to_owned(), given));
         }
-        let mut best = self.round(&centred.cloud, target, &starts, &warnings)?;
+        if starts.is_empty() {
+            return Err(Error::NoPose(warnings.join(" ")));
+        }
+        search.add(&starts).map_err(Error::Refine)?;
+        let mut best = search.best().map_err(Error::Refine)?;
+        let mut probability = self.probability(&best.features);
         clock.lap("refine");
 
         // The second round, where the first left doubt: the network from all around.
         if let Some(net) = &self.network
             && self.options.rotation == RotationRange::Any
-            && best.probability < SURE
+            && probability < SURE
         {
             let found: Vec<Start> = cube_rotations()[1..]
                 .par_iter()
                 .enumerate()
                 .filter_map(|(i, rotation)| {
                     let start = turned(given.rotation * rotation);
-                    let found = net.look_from(&thin, &target.thin, &start).ok()?;
+                    let found = net.glance_from(&thin, &target.thin, &start).ok()?;
                     Some((format!("network, orientation {}", i + 1), found.target_from_source))
                 })
                 .collect();
             clock.lap("network, 23 orientations");
-            starts.extend(found);
-            best = self.round(&centred.cloud, target, &starts, &warnings)?;
+            search.add(&found).map_err(Error::Refine)?;
+            best = search.best().map_err(Error::Refine)?;
+            probability = self.probability(&best.features);
             clock.lap("refine again");
         }
 
-        let abstain = best.probability < self.options.abstain_below;
+        let abstain = probability < self.options.abstain_below;
         if abstain {
             warnings.push(format!(
                 "The pose is right with a probability of {:.0}% only: check it, give a first guess, or crop both \
                  clouds to what they share.",
-                100.0 * best.probability
+                100.0 * probability
             ));
         }
         Ok(Outcome {
             target_from_source: to_input(&best.pose, &centred, &target.centred),
-            probability: best.probability,
+            probability,
             abstain,
             method: self.options.method,
             start: best.start,
@@ -211,36 +207,6 @@ impl Registrar {
         })
     }
 
-    /// Refines the best supported of `starts`, or takes the first one where refinement is off.
-    fn round(
-        &self,
-        source: &PointCloud,
-        target: &Target,
-        starts: &[Start],
-        warnings: &[String],
-    ) -> Result<Round, Error> {
-        let Some((first_name, first)) = starts.first() else {
-            return Err(Error::NoPose(warnings.join(" ")));
-        };
-        if self.options.refine.is_none() {
-            // The evidence of a coarse pose takes a look of its own; a refinement brings it along.
-            let evidence = target.refine.evidence(source, first).map_err(Error::Refine)?;
-            let features = Features::new(&evidence, None, first, &[]);
-            let probability = self.probability(&features);
-            let (pose, start) = (*first, first_name.clone());
-            return Ok(Round { pose, start, refinement: None, evidence, features, probability });
-        }
-        let named: Vec<(&str, Rigid)> = starts.iter().map(|(name, pose)| (name.as_str(), *pose)).collect();
-        let refined = target.refine.refine(source, &named).map_err(Error::Refine)?;
-        let rivals: Vec<(Rigid, f64)> =
-            refined.starts.iter().map(|s| (s.target_from_source, s.support)).collect();
-        let pose = refined.target_from_source;
-        let features = Features::new(&refined.evidence, Some(&refined), &pose, &rivals);
-        let probability = self.probability(&features);
-        let (start, evidence) = (refined.start.clone(), refined.evidence.clone());
-        Ok(Round { pose, start, refinement: Some(refined), evidence, features, probability })
-    }
-
     /// The calibrated probability. It was fitted on [`Method::Auto`] with refinement; for other methods, whose
     /// few starts give no rivals to compare with, and for poses without refinement, it is kept below the square
     /// of the fitness, which only errs on the side of doubt.
@@ -250,9 +216,11 @@ impl Registrar {
         if known { fitted } else { fitted.min(features.fitness().powi(2)) }
     }
 
-    fn global(&self, source: &PointCloud, target: &PointCloud) -> Result<Rigid, RegisterError> {
+    /// What RANSAC found, best first.
+    fn global(&self, source: &PointCloud, target: &PointCloud) -> Result<Vec<Start>, RegisterError> {
         let config = FpfhRansacConfig { seed: self.options.seed, ..FpfhRansacConfig::default() };
-        Ok(FpfhRansac::new(config).register(source, target)?.target_from_source)
+        let found = FpfhRansac::new(config).hypotheses(source, target)?;
+        Ok(found.poses.into_iter().map(|pose| ("fpfh-ransac".to_owned(), pose)).collect())
     }
 
     fn coarse(&self, found: &Registration, source: &Centred, target: &Target) -> CoarsePose {
@@ -264,7 +232,8 @@ impl Registrar {
         let gamma = |name: &str| branches.iter().find(|b| b.name == name).map_or(0.0, |b| b.inlier_ratio);
         let (dense, skeleton) = (gamma("dense"), gamma("skeleton"));
         let lambda = if dense + skeleton > 0.0 { dense / (dense + skeleton) } else { 0.5 };
-        let shift = |p: &mut [f64; 3], centre: &nalgebra::Vector3<f64>| (0..3).for_each(|c| p[c] += centre[c]);
+        let shift =
+            |p: &mut [f64; 3], centre: &nalgebra::Vector3<f64>| (0..3).for_each(|c| p[c] += centre[c]);
         let mut skeletons = found.skeletons.clone();
         if let Some(Skeletons { source: ours, target: theirs }) = &mut skeletons {
             ours.points.iter_mut().for_each(|p| shift(p, &source.centre));

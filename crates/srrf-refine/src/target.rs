@@ -1,0 +1,112 @@
+//! [`RefineTarget`] and [`RefineSource`]: clouds made ready, and [`refine`] for one pair.
+
+use srrf_cloud::{PointCloud, Rigid};
+
+use crate::evidence::{Evidence, evidence};
+use crate::prepared::Prepared;
+use crate::refine::{Refinement, Run, StartSupport};
+use crate::{RefineConfig, RefineError};
+
+/// A target made ready, to refine the poses of many sources.
+#[derive(Debug)]
+pub struct RefineTarget {
+    config: RefineConfig,
+    prepared: Prepared,
+}
+
+/// A source made ready by [`RefineTarget::source`], to refine many of its poses.
+#[derive(Debug)]
+pub struct RefineSource {
+    prepared: Prepared,
+}
+
+impl RefineTarget {
+    /// Centres, thins and indexes the target and estimates its normals.
+    ///
+    /// # Errors
+    /// [`RefineError::Config`], and [`RefineError::Target`] for a cloud that determines no rotation.
+    pub fn new(target: &PointCloud, config: &RefineConfig) -> Result<Self, RefineError> {
+        config.validate()?;
+        let prepared = Prepared::new(target, config).map_err(RefineError::Target)?;
+        Ok(Self { config: *config, prepared })
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &RefineConfig {
+        &self.config
+    }
+
+    /// Makes a source ready in the same way.
+    ///
+    /// # Errors
+    /// [`RefineError::Source`] for a cloud that determines no rotation.
+    pub fn source(&self, source: &PointCloud) -> Result<RefineSource, RefineError> {
+        let prepared = Prepared::new(source, &self.config).map_err(RefineError::Source)?;
+        Ok(RefineSource { prepared })
+    }
+
+    /// What speaks for a pose as it is, without refinement.
+    pub fn evidence(&self, source: &RefineSource, pose: &Rigid) -> Evidence {
+        evidence(&source.prepared, &self.prepared, pose)
+    }
+
+    /// Refines the best of `starts`: named poses that map the source near the target.
+    ///
+    /// # Errors
+    /// [`RefineError::Source`] for a cloud that determines no rotation, [`RefineError::NoStart`] without
+    /// starts, [`RefineError::Start`] for one that is not finite.
+    pub fn refine(&self, source: &PointCloud, starts: &[(&str, Rigid)]) -> Result<Refinement, RefineError> {
+        let source = self.source(source)?;
+        self.finish(&source, &self.shortlist(&source, starts)?)
+    }
+
+    /// The first half of [`RefineTarget::refine`]: a short run of each start, or just the support of a single one.
+    /// Lists may be joined, so that starts can come in rounds.
+    ///
+    /// # Errors
+    /// [`RefineError::Start`] for a start that is not finite.
+    pub fn shortlist(
+        &self,
+        source: &RefineSource,
+        starts: &[(&str, Rigid)],
+    ) -> Result<Vec<StartSupport>, RefineError> {
+        let finite = |p: &Rigid| p.rotation.iter().chain(p.translation.iter()).all(|v| v.is_finite());
+        match starts.iter().find(|(_, pose)| !finite(pose)) {
+            Some((name, _)) => Err(RefineError::Start((*name).to_owned())),
+            None => Ok(self.run(source).shortlist(starts)),
+        }
+    }
+
+    /// The second half of [`RefineTarget::refine`]: the full run of the best of the shortlist.
+    ///
+    /// # Errors
+    /// [`RefineError::NoStart`] for an empty list.
+    pub fn finish(&self, source: &RefineSource, starts: &[StartSupport]) -> Result<Refinement, RefineError> {
+        self.run(source).finish(starts)
+    }
+
+    fn run<'a>(&'a self, source: &'a RefineSource) -> Run<'a> {
+        Run { source: &source.prepared, target: &self.prepared, config: &self.config }
+    }
+}
+
+/// Refines the best of `starts`: named poses that map `source` near `target`.
+///
+/// Several starts get a short run each, on few points; the best supported one gets the full run: a
+/// robust stage (nearest neighbours both ways, Geman-McClure, shrinking scale), coarse to fine for
+/// large clouds, then a soft stage for small ones. Then the residuals are looked at, and the answer is
+/// the refined pose, its cautious variant or the start ([`crate::Verdict`]).
+///
+/// The answer does not depend on the number of threads, and on the order of the points only by
+/// rounding.
+///
+/// # Errors
+/// [`RefineError`] for clouds, settings or starts that cannot be used.
+pub fn refine(
+    source: &PointCloud,
+    target: &PointCloud,
+    starts: &[(&str, Rigid)],
+    config: &RefineConfig,
+) -> Result<Refinement, RefineError> {
+    RefineTarget::new(target, config)?.refine(source, starts)
+}
