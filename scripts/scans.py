@@ -7,8 +7,9 @@
 SCANS holds `bunny/` (the Stanford bunny's range scans and bun.conf) and `lidar/` (source.ply, target.ply and
 T_target_source.txt, 4 x 4). Every ordered pair is registered from the given frames and from random poses of the
 source (seeded). A pose is right within 5 degrees and a tenth of the target's radius (root mean square) where the
-source's centroid lands. Seconds are wall time of the whole job as a user has it: for srrf a new process that reads
-both files; for the others the calls after reading, without Python's start and import.
+source's centroid lands. Every job is a new process that reads both files and writes the pose: `s` is its wall time,
+`cpu` its user and system time, start and imports included; for the Python peers `s` in brackets is without them and
+without reading.
 
 Open3D: voxel-thinned, normals and FPFH radii 2 and 5 voxels, RANSAC on feature matches with the checks and limits of
 Open3D's own global registration tutorial (edge length 0.9, distance 1.5 voxels, 100,000 iterations, confidence
@@ -19,6 +20,7 @@ local method, so it is not expected to solve random poses.
 
 import argparse
 import json
+import os
 import pathlib
 import subprocess
 import sys
@@ -26,8 +28,9 @@ import tempfile
 import time
 
 import numpy as np
-import open3d as o3d
-import small_gicp
+
+if sys.argv[1:2] != ["--job"] or sys.argv[2:3] == ["open3d"]:
+    import open3d as o3d
 
 
 def read_bunny(folder):
@@ -65,28 +68,45 @@ def cloud(points):
     return c
 
 
-def by_srrf(program, source, target, folder, threads):
-    files = [folder / "source.ply", folder / "target.ply", folder / "result.json"]
-    for points, file in ((source, files[0]), (target, files[1])):
-        o3d.io.write_point_cloud(str(file), cloud(points))
+def run(command):
+    """Runs a process; its wall and CPU seconds."""
     begun = time.perf_counter()
-    command = [program, "register", files[0], files[1], "--json", files[2], "--threads", str(threads), "--quiet"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    seconds = time.perf_counter() - begun
-    if not files[2].exists():
-        sys.exit(done.stderr)
-    result = json.loads(files[2].read_text())
-    files[2].unlink()
-    return np.array(result["target_from_source"]), seconds, result["probability"]
+    process = subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    said = process.stderr.read().decode()
+    _, status, used = os.wait4(process.pid, 0)
+    if os.waitstatus_to_exitcode(status) not in (0, 3):
+        sys.exit(said)
+    return time.perf_counter() - begun, used.ru_utime + used.ru_stime
 
 
-def by_open3d(source, target, voxel):
+def by_srrf(program, files, folder, threads):
+    out = folder / "result.json"
+    wall, cpu = run([program, "register", *files, "--json", out, "--threads", threads, "--quiet"])
+    result = json.loads(out.read_text())
+    return np.array(result["target_from_source"]), wall, cpu, None, result["probability"]
+
+
+def by_peer(name, files, folder, voxel, threads):
+    out = folder / "pose.json"
+    wall, cpu = run([sys.executable, __file__, "--job", name, *files, out, voxel, threads])
+    result = json.loads(out.read_text())
+    return np.array(result["pose"]), wall, cpu, result["seconds"], None
+
+
+def job(name, source, target, out, voxel, threads):
+    """What one of the peers does in its own process."""
+    work = {"open3d": by_open3d, "small_gicp": by_small_gicp}[name]
+    pose, seconds = work(source, target, float(voxel), int(threads))
+    pathlib.Path(out).write_text(json.dumps({"pose": np.asarray(pose).tolist(), "seconds": seconds}))
+
+
+def by_open3d(source, target, voxel, _threads):
+    clouds = [o3d.io.read_point_cloud(path) for path in (source, target)]
     begun = time.perf_counter()
     o3d.utility.random.seed(1)
     registration = o3d.pipelines.registration
     parts = []
-    for points in (source, target):
-        full = cloud(points)
+    for full in clouds:
         down = full.voxel_down_sample(voxel)
         normals = o3d.geometry.KDTreeSearchParamHybrid(2 * voxel, 30)
         full.estimate_normals(normals)
@@ -107,6 +127,9 @@ def by_open3d(source, target, voxel):
 
 
 def by_small_gicp(source, target, voxel, threads):
+    import small_gicp
+
+    source, target = (small_gicp.read_ply(path).points()[:, :3] for path in (source, target))
     begun = time.perf_counter()
     found = small_gicp.align(
         target, source, registration_type="GICP", downsampling_resolution=voxel / 2,
@@ -130,6 +153,8 @@ def main():
     parser.add_argument("--poses", type=int, default=1, help="random poses of each pair, beside the given frames")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
+    if sys.argv[1:2] == ["--job"]:
+        return job(*sys.argv[2:])
     arguments = parser.parse_args()
     rng = np.random.default_rng(arguments.seed)
 
@@ -143,7 +168,8 @@ def main():
     clouds = [np.asarray(o3d.io.read_point_cloud(str(lidar / f"{n}.ply")).points) for n in ("source", "target")]
     pairs.append(("lidar", *clouds, np.loadtxt(lidar / "T_target_source.txt"), 0.5))
 
-    print("| pair | from | overlap | srrf | p | s | Open3D | s | small_gicp | s |\n|---|---|---|---|---|---|---|---|---|---|")
+    print("| pair | from | overlap | srrf | p | s | cpu | Open3D | s | cpu | small_gicp | s | cpu |")
+    print("|---" * 13 + "|")
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -156,22 +182,29 @@ def main():
             for k in range(1 + arguments.poses):
                 move = np.eye(4) if k == 0 else random_pose(rng, radius)
                 moved, wanted = source @ move[:3, :3].T + move[:3, 3], truth @ np.linalg.inv(move)
-                ours, ours_s, p = by_srrf(arguments.srrf, moved, target, folder, arguments.threads)
-                theirs, theirs_s = by_open3d(moved, target, voxel)
-                gicp, gicp_s = by_small_gicp(moved, target, voxel, arguments.threads)
-                e = [errors(x, wanted, moved, target) for x in (ours, theirs, gicp)]
-                rows.append((k == 0, np.mean(near), e, (ours_s, theirs_s, gicp_s), p))
-                cell = [f"{d:.2f}{'' if right else ' ✗'}" for d, _, right in e]
-                print(f"| {label} | {'given' if k == 0 else 'random'} | {np.mean(near):.2f} | {cell[0]} | {p:.2f} | "
-                      f"{ours_s:.1f} | {cell[1]} | {theirs_s:.1f} | {cell[2]} | {gicp_s:.1f} |", flush=True)
+                files = [folder / "source.ply", folder / "target.ply"]
+                for points, file in zip((moved, target), files):
+                    o3d.io.write_point_cloud(str(file), cloud(points))
+                found = [by_srrf(arguments.srrf, files, folder, arguments.threads)]
+                found += [by_peer(n, files, folder, voxel, arguments.threads) for n in ("open3d", "small_gicp")]
+                e = [errors(f[0], wanted, moved, target) for f in found]
+                p = found[0][4]
+                rows.append((k == 0, e, found, p))
+                cells = [f"{d:.2f}{'' if right else ' ✗'}" for d, _, right in e]
+                times = [f"{wall:.2f}{'' if warm is None else f' ({warm:.2f})'} | {cpu:.2f}" for _, wall, cpu, warm, _ in found]
+                print(f"| {label} | {'given' if k == 0 else 'random'} | {np.mean(near):.2f} | {cells[0]} | {p:.2f} | "
+                      f"{times[0]} | {cells[1]} | {times[1]} | {cells[2]} | {times[2]} |", flush=True)
     print()
     for given in (True, False):
         part = [r for r in rows if r[0] == given]
-        right = [sum(r[2][m][2] for r in part) for m in range(3)]
-        seconds = [np.median([r[3][m] for r in part]) for m in range(3)]
+        right = [sum(r[1][m][2] for r in part) for m in range(3)]
+        wall, cpu = ([np.median([r[2][m][which] for r in part]) for m in range(3)] for which in (1, 2))
         print(f"{'Given frames' if given else 'Random poses'}: of {len(part)} right: srrf {right[0]}, Open3D {right[1]}, "
-              f"small_gicp {right[2]}; median seconds {seconds[0]:.2f}, {seconds[1]:.2f}, {seconds[2]:.2f}.")
-    silent = sum(1 for r in rows if not r[2][0][2] and r[4] >= 0.5)
+              f"small_gicp {right[2]}; median seconds {wall[0]:.2f}, {wall[1]:.2f}, {wall[2]:.2f}, median CPU seconds "
+              f"{cpu[0]:.2f}, {cpu[1]:.2f}, {cpu[2]:.2f}.")
+    faster = sum(r[2][0][1] < r[2][1][1] for r in rows)
+    print(f"srrf took less wall time than Open3D in {faster} of {len(rows)}.")
+    silent = sum(1 for r in rows if not r[1][0][2] and r[3] >= 0.5)
     print(f"srrf was wrong without abstaining in {silent} of {len(rows)}.")
 
 

@@ -1,0 +1,109 @@
+//! What the refinement makes of the network's own poses, on the shapes of ModelNet40's training split that the
+//! network was validated on; no test shape is looked at. One CSV line a pair: the errors of the network, of the full
+//! refinement, of a cautious one, of halfway between the network and that, and of the answer by the rule, beside
+//! what the rule sees.
+//!
+//! `cargo run --release -p srrf --example refine_choices -- MODELNET [SHAPES] > choices.csv`
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
+
+use std::path::Path;
+
+use rayon::prelude::*;
+use srrf_cloud::source::{Split, open};
+use srrf_cloud::{EulerXyz, Register, Rigid};
+use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream};
+use srrf_model::{SrrfRegister, device, embedded};
+use srrf_refine::{Metric, RefineConfig, RefineTarget, Verdict};
+
+const SEED: u64 = 77_002;
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let data = arguments.next().expect("usage: refine_choices MODELNET [SHAPES]");
+    let count: usize = arguments.next().map_or(104, |n| n.parse().unwrap());
+    let shapes = open(Path::new(&data), Split::Train).unwrap();
+    let flex = device("flex").unwrap();
+    let network = SrrfRegister::new(embedded::load_default(&flex).unwrap(), flex);
+    let synthesizer = PairSynthesizer::new(PairConfig::default()).unwrap();
+
+    println!(
+        "corruption,severity,shape,class,start,full,cautious,halfway,rule,verdict,normal_correlation,correlation,median,\
+         support_start,support_full,support_cautious,fitness,inlier_rmse,moved_full,moved_cautious"
+    );
+    let lines: Vec<String> = (0..count * CorruptionKind::ALL.len())
+        .into_par_iter()
+        .map(|i| {
+            let (shape, kind) = (i / CorruptionKind::ALL.len(), CorruptionKind::ALL[i % 12]);
+            let severity = Severity::ALL[(shape + i) % 5];
+            let index = ((shape as f64 + 0.5) * shapes.len() as f64 / count as f64) as usize;
+            let stream = Stream { seed: SEED, item: i as u64 };
+            let pair = synthesizer
+                .pair(shapes.as_ref(), index, Some((kind, severity)), PoseDraw::Seeded, stream)
+                .unwrap();
+            let found = network.register(&pair.source, &pair.target).unwrap();
+            let mut starts: Vec<(&str, Rigid)> = vec![("answer", found.target_from_source)];
+            starts.extend(found.branches.iter().map(|b| (b.name, b.target_from_source)));
+            let rule = RefineConfig::default();
+            let full = RefineConfig { check_deformation: false, ..rule };
+            let cautious = RefineConfig {
+                metric: Metric::PointToPoint,
+                end_spacings: 0.3,
+                soft: false,
+                check_deformation: false,
+                ..rule
+            };
+            let by = |config: &RefineConfig, starts: &[(&str, Rigid)]| {
+                RefineTarget::new(&pair.target, config).unwrap().refine(&pair.source, starts).unwrap()
+            };
+            let (rule, full) = (by(&rule, &starts), by(&full, &starts));
+            let cautious = by(&cautious, &[("start", winner(&full, &starts))]);
+            let start = winner(&full, &starts);
+            let halfway = Rigid {
+                rotation: Rigid::nearest_rotation(
+                    &(0.5 * (start.rotation + cautious.target_from_source.rotation)),
+                )
+                .unwrap(),
+                translation: 0.5 * (start.translation + cautious.target_from_source.translation),
+            };
+            let error = |pose: &Rigid| -> f64 {
+                let (a, b) = (
+                    EulerXyz::from_matrix(&pose.rotation).to_deg(),
+                    EulerXyz::from_matrix(&pair.target_from_source.rotation).to_deg(),
+                );
+                (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>() / 3.0
+            };
+            format!(
+                "{},{},{index},{},{:.6},{:.6},{:.6},{:.6},{:.6},{},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.6},{:.4},{:.4}",
+                kind.name(),
+                severity.get(),
+                shapes.class(index),
+                error(&found.target_from_source),
+                error(&full.target_from_source),
+                error(&cautious.target_from_source),
+                error(&halfway),
+                error(&rule.target_from_source),
+                match rule.verdict {
+                    Verdict::Rigid => "rigid",
+                    Verdict::Deformed => "deformed",
+                    Verdict::Unsupported => "unsupported",
+                },
+                full.residuals.normal_correlation,
+                full.residuals.correlation,
+                full.residuals.median,
+                full.starts[0].support,
+                full.support,
+                cautious.support,
+                full.evidence.fitness,
+                full.evidence.inlier_rmse / full.evidence.spacing,
+                start.angle_to_deg(&full.target_from_source),
+                start.angle_to_deg(&cautious.target_from_source),
+            )
+        })
+        .collect();
+    lines.iter().for_each(|line| println!("{line}"));
+}
+
+/// The start that won, as it was given.
+fn winner(refined: &srrf_refine::Refinement, starts: &[(&str, Rigid)]) -> Rigid {
+    starts.iter().find(|(name, _)| *name == refined.start).map_or(starts[0].1, |(_, pose)| *pose)
+}
