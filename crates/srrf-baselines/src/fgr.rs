@@ -4,7 +4,7 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid};
-use srrf_refine::{Match, NormalEquations, RefineConfig, RefineTarget};
+use srrf_refine::{Deformed, Match, NormalEquations, RefineConfig, RefineTarget};
 
 use crate::correspond::{Correspondences, correspond};
 
@@ -44,7 +44,7 @@ impl Default for FgrConfig {
             tuple_scale: 0.95,
             max_tuples: 1000,
             seed: 0,
-            refine: Some(RefineConfig::default()),
+            refine: Some(RefineConfig { deformed: Deformed::Halfway, ..RefineConfig::default() }),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid};
-use srrf_refine::{RefineConfig, RefineTarget};
+use srrf_refine::{Deformed, RefineConfig, RefineTarget};
 
 use crate::correspond::correspond;
 use crate::ransac::{Search, ransac};
@@ -44,7 +44,7 @@ impl Default for FpfhRansacConfig {
             confidence: 0.999,
             hypotheses: 4,
             seed: 0,
-            refine: Some(RefineConfig::default()),
+            refine: Some(RefineConfig { deformed: Deformed::Halfway, ..RefineConfig::default() }),
         }
     }
 }

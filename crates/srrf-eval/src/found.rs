@@ -62,7 +62,7 @@ impl Found {
             converged: found.converged,
             skeletons: found
                 .skeletons
-                .and_then(|s| SkeletonAgreement::new(&s.source, &s.target, truth).ok())
+                .and_then(|s| SkeletonAgreement::new(&s.source.points, &s.target.points, truth).ok())
                 .map(|a| [a.chamfer, a.chamfer_sum, a.spread].map(Exact)),
         };
         Self { seconds: Exact(seconds), answer: answer.map(poses).map_err(|e| e.to_string()) }

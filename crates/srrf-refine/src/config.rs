@@ -28,6 +28,18 @@ impl Metric {
     }
 }
 
+/// What to answer where the clouds look deformed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Deformed {
+    /// The first start that agrees with the best one, as it was given: never worse than a learned method, which
+    /// knows shapes.
+    #[default]
+    Start,
+    /// Halfway from that start to where point to point leads, for starts that know no shapes.
+    Halfway,
+}
+
 /// Settings of the refinement. Lengths are relative to the clouds, so that the defaults serve
 /// objects and streets alike. The defaults were chosen on training shapes of ModelNet40 with the
 /// program `examples/tune.rs`; `docs/experiments.md` has the figures.
@@ -65,10 +77,12 @@ pub struct RefineConfig {
     /// Clouds with more points than this skip the soft stage. Default 4,096: at that density nearest
     /// neighbours on planes are as exact, and faster.
     pub soft_points: usize,
-    /// Whether to look for deformation, which makes exact alignment worthless, and then to go only
-    /// halfway ([`crate::Verdict::Deformed`]). Default true; clouds of more than `coarse_points` are exempt. Switch it off
-    /// for small clouds that are two samplings of a rigid surface, where it errs (`docs/experiments.md`).
+    /// Whether to look for deformation, which makes exact alignment worthless ([`crate::Verdict::Deformed`]).
+    /// Default true; clouds of more than `coarse_points` are exempt. Switch it off for small clouds that are known to
+    /// be rigid: of two sparse samplings of one surface, it takes one in ten for deformed (`docs/experiments.md`).
     pub check_deformation: bool,
+    /// What to answer then. Default: the start.
+    pub deformed: Deformed,
 }
 
 impl Default for RefineConfig {
@@ -87,6 +101,7 @@ impl Default for RefineConfig {
             soft: true,
             soft_points: 4096,
             check_deformation: true,
+            deformed: Deformed::Start,
         }
     }
 }

@@ -33,7 +33,7 @@ mod soft;
 mod solve;
 mod target;
 
-pub use config::{Metric, RefineConfig, RefineError};
+pub use config::{Deformed, Metric, RefineConfig, RefineError};
 pub use deformation::ResidualStructure;
 pub use evidence::Evidence;
 pub use refine::{Refinement, StartSupport, Verdict};

@@ -49,6 +49,7 @@ pub use html::viewer_element;
 pub use number::Number;
 pub use page::{Page, ViewError};
 pub use pair::{Pair, Pose, Up};
+pub use srrf_cloud::{Skeleton, SoftMatch};
 
 /// Most points of one cloud that a page draws. Phones turn two clouds of this size smoothly, and a
 /// page of one pair stays under 4 MB.

@@ -9,9 +9,10 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use srrf_cloud::source::{Split, open};
+use srrf_cloud::shapes::ProceduralShapes;
+use srrf_cloud::source::{ShapeSource, Split, open};
 use srrf_cloud::{EulerXyz, Register, Rigid};
-use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream};
+use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream};
 use srrf_model::{SrrfRegister, device, embedded};
 use srrf_refine::{Metric, RefineConfig, RefineTarget, Verdict};
 
@@ -24,21 +25,29 @@ fn main() {
     let shapes = open(Path::new(&data), Split::Train).unwrap();
     let flex = device("flex").unwrap();
     let network = SrrfRegister::new(embedded::load_default(&flex).unwrap(), flex);
-    let synthesizer = PairSynthesizer::new(PairConfig::default()).unwrap();
+    let built_in = ProceduralShapes::new(SEED, 400, None).unwrap();
+    let synthesizers = [Sampling::Shared, Sampling::Independent].map(|sampling| {
+        let config = PairConfig { sampling, keep_correspondence: false, ..PairConfig::default() };
+        PairSynthesizer::new(config).unwrap()
+    });
 
     println!(
-        "corruption,severity,shape,class,start,full,cautious,halfway,rule,verdict,normal_correlation,correlation,median,\
-         support_start,support_full,support_cautious,fitness,inlier_rmse,moved_full,moved_cautious"
+        "corruption,sampling,severity,shape,class,start,full,cautious,halfway,rule,verdict,normal_correlation,correlation,median,\
+         support_start,support_full,support_cautious,fitness,inlier_rmse,moved_full,moved_cautious,wide,fused_halfway"
     );
     let lines: Vec<String> = (0..count * CorruptionKind::ALL.len())
         .into_par_iter()
         .map(|i| {
             let (shape, kind) = (i / CorruptionKind::ALL.len(), CorruptionKind::ALL[i % 12]);
             let severity = Severity::ALL[(shape + i) % 5];
+            // Every other shape is built in and sampled twice.
+            let independent = shape % 2 == 1;
+            let shapes: &dyn ShapeSource = if independent { &built_in } else { shapes.as_ref() };
+            let synthesizer = &synthesizers[usize::from(independent)];
             let index = ((shape as f64 + 0.5) * shapes.len() as f64 / count as f64) as usize;
             let stream = Stream { seed: SEED, item: i as u64 };
             let pair = synthesizer
-                .pair(shapes.as_ref(), index, Some((kind, severity)), PoseDraw::Seeded, stream)
+                .pair(shapes, index, Some((kind, severity)), PoseDraw::Seeded, stream)
                 .unwrap();
             let found = network.register(&pair.source, &pair.target).unwrap();
             let mut starts: Vec<(&str, Rigid)> = vec![("answer", found.target_from_source)];
@@ -58,13 +67,8 @@ fn main() {
             let (rule, full) = (by(&rule, &starts), by(&full, &starts));
             let cautious = by(&cautious, &[("start", winner(&full, &starts))]);
             let start = winner(&full, &starts);
-            let halfway = Rigid {
-                rotation: Rigid::nearest_rotation(
-                    &(0.5 * (start.rotation + cautious.target_from_source.rotation)),
-                )
-                .unwrap(),
-                translation: 0.5 * (start.translation + cautious.target_from_source.translation),
-            };
+            let halfway = between(&start, &cautious.target_from_source);
+            let fused_halfway = between(&found.target_from_source, &cautious.target_from_source);
             let error = |pose: &Rigid| -> f64 {
                 let (a, b) = (
                     EulerXyz::from_matrix(&pose.rotation).to_deg(),
@@ -73,8 +77,9 @@ fn main() {
                 (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>() / 3.0
             };
             format!(
-                "{},{},{index},{},{:.6},{:.6},{:.6},{:.6},{:.6},{},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.6},{:.4},{:.4}",
+                "{},{},{},{index},{},{:.6},{:.6},{:.6},{:.6},{:.6},{},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.6},{:.4},{:.4},{:.4},{:.6}",
                 kind.name(),
+                if independent { "independent" } else { "shared" },
                 severity.get(),
                 shapes.class(index),
                 error(&found.target_from_source),
@@ -97,10 +102,19 @@ fn main() {
                 full.evidence.inlier_rmse / full.evidence.spacing,
                 start.angle_to_deg(&full.target_from_source),
                 start.angle_to_deg(&cautious.target_from_source),
+                full.residuals.wide_correlation,
+                error(&fused_halfway),
             )
         })
         .collect();
     lines.iter().for_each(|line| println!("{line}"));
+}
+
+fn between(a: &Rigid, b: &Rigid) -> Rigid {
+    Rigid {
+        rotation: Rigid::nearest_rotation(&(0.5 * (a.rotation + b.rotation))).unwrap(),
+        translation: 0.5 * (a.translation + b.translation),
+    }
 }
 
 /// The start that won, as it was given.

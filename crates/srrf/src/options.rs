@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 use srrf_cloud::Rigid;
-use srrf_refine::RefineConfig;
+use srrf_refine::{Deformed, RefineConfig};
 
 /// How starts for the refinement are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -116,7 +116,7 @@ impl Default for Options {
             method: Method::Auto,
             rotation: RotationRange::Any,
             given: None,
-            refine: Some(RefineConfig::default()),
+            refine: Some(RefineConfig { deformed: Deformed::Halfway, ..RefineConfig::default() }),
             weights: None,
             device: "flex".to_owned(),
             seed: 0,

@@ -107,13 +107,25 @@ impl Registrar {
     /// # Errors
     /// As [`Registrar::register`].
     pub fn register_to(&self, source: &PointCloud, target: &Target) -> Result<Outcome, Error> {
+        self.register_from(source, target, &self.options.given.unwrap_or_else(Rigid::identity))
+    }
+
+    /// Registers `source` to a prepared target with a first guess of its own, in place of [`Options::given`].
+    ///
+    /// # Errors
+    /// As [`Registrar::register`].
+    pub fn register_from(
+        &self,
+        source: &PointCloud,
+        target: &Target,
+        given: &Rigid,
+    ) -> Result<Outcome, Error> {
         let mut clock = Clock::new();
         clock.times.push(StageTime { stage: "prepare target", seconds: target.seconds });
         source.check_rotation_observable().map_err(Error::Source)?;
         let centred = Centred::new(source).map_err(Error::Source)?;
         let thin = thinned(&centred.cloud);
-        let given = self.options.given.unwrap_or_else(Rigid::identity);
-        let given = from_input(&given, &centred, &target.centred);
+        let given = from_input(given, &centred, &target.centred);
         let refine = target.refine.source(&centred.cloud).map_err(Error::Refine)?;
         let mut search = Search::new(&target.refine, refine, self.options.refine.is_some());
         clock.lap("prepare source");

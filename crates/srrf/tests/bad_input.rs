@@ -77,6 +77,9 @@ fn options_that_make_no_sense() {
     says(&register(&["--weights", "srrf-huge"]), 2, &["srrf-huge", "srrf-small"]);
     says(&register(&["--weights", "source.ply"]), 2, &["source.ply", "safetensors"]);
     says(&register(&["--device", "abacus"]), 2, &["abacus", "flex"]);
+    if cfg!(not(feature = "rerun")) {
+        says(&register(&["--rrd", "out.rrd"]), 2, &["--rrd", "--features rerun", "--html"]);
+    }
     says(&register(&["--threads", "0"]), 2, &["at least one thread"]);
     says(&register(&["--format-source", "pcd"]), 2, &["source.ply", "streams only"]);
     for bad in [&["--method", "magic"][..], &["--rotation", "90"], &["--seed", "-1"], &["--nonsense"]] {

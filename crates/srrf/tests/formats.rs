@@ -47,6 +47,17 @@ fn from_and_to_every_format() {
     }
 }
 
+/// A recording starts with Rerun's mark and holds both clouds.
+#[cfg(feature = "rerun")]
+#[test]
+fn a_recording() {
+    let scene = Scene::new(700);
+    scene.srrf(&["register", "source.ply", "target.ply", "--rrd", "out.rrd"]).ok();
+    let bytes = std::fs::read(scene.path("out.rrd")).unwrap();
+    assert_eq!(&bytes[..3], b"RRF");
+    assert!(bytes.len() > 3 * 700 * 12, "{} bytes", bytes.len());
+}
+
 /// A format that this build leaves out is refused with the way to get it.
 #[cfg(not(feature = "las"))]
 #[test]

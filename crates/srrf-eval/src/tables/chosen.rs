@@ -1,7 +1,7 @@
 //! The pairs that the page shows in 3D.
 
 use srrf_cloud::Register;
-use srrf_view::{Number, Pair as ViewPair, Pose, Skeleton, Up, viewer_element};
+use srrf_view::{Number, Pair as ViewPair, Pose, Up, viewer_element};
 
 use crate::EvalError;
 use crate::pairs::{EvalPair, PairSource};
@@ -72,10 +72,7 @@ fn view<'a>(
     shown = shown.pose(Pose::new("truth", record.truth));
     let found = skeletons.and_then(|s| s.register(&made.pair.source, &made.pair.target).ok());
     match found.and_then(|f| f.skeletons) {
-        Some(both) => {
-            let skeleton = |points| Skeleton { points, radii: Vec::new() };
-            shown.skeletons(skeleton(both.source), skeleton(both.target))
-        }
+        Some(both) => shown.skeletons(both.source, both.target),
         None => shown,
     }
 }

@@ -71,7 +71,7 @@ impl<'a> SampledPairs<'a> {
             Choice::Skeleton => {
                 let found = self.skeletons.register(&pair.source, &pair.target).map_err(|e| e.to_string())?;
                 let skeletons = found.skeletons.ok_or("the method makes no skeletons")?;
-                Ok([skeletons.source, skeletons.target])
+                Ok([skeletons.source.points, skeletons.target.points])
             }
         }
     }

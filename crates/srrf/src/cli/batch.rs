@@ -9,7 +9,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::ThreadPoolBuilder;
 use serde_json::{Value, json};
-use srrf::{Options, Registrar};
+use srrf::Registrar;
 
 use super::batch_output::Results;
 use super::batch_pairs::{PairRow, Pairs};
@@ -55,8 +55,7 @@ pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
     files::check_output(&args.out)?;
     let threads = args.common.start_threads()?;
     let pairs = Pairs::read(&args.pairs)?;
-    let options = args.method.options();
-    let registrar = Registrar::new(options.clone()).map_err(|e| Failure::Usage(e.to_string()))?;
+    let registrar = Registrar::new(args.method.options()).map_err(|e| Failure::Usage(e.to_string()))?;
     let described = args.describe();
     let (results, done) = Results::open(&args.out, &pairs.rows, &described)?;
     let todo: Vec<&PairRow> = pairs.rows.iter().filter(|row| !done.contains_key(&row.number)).collect();
@@ -67,7 +66,7 @@ pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
     interrupt::advise("; the same command goes on where this one stopped");
 
     let bar = progress(todo.len(), args.common.quiet);
-    let batch = Batch { pairs: &pairs, registrar: &registrar, options: &options, described: &described };
+    let batch = Batch { pairs: &pairs, registrar: &registrar, described: &described };
     let tally = batch.run(&todo, threads, results, &bar)?;
     bar.finish_and_clear();
     let before = done.values().filter(|has_pose| !**has_pose).count();
@@ -116,7 +115,6 @@ struct Tally {
 struct Batch<'a> {
     pairs: &'a Pairs,
     registrar: &'a Registrar,
-    options: &'a Options,
     described: &'a Value,
 }
 
@@ -192,9 +190,9 @@ impl Batch<'_> {
         let mut outcome = match &row.initial {
             None => self.registrar.register(&source.cloud, &target.cloud).map_err(fail)?,
             Some(initial) => {
-                let given = Some(transform::read(&self.pairs.path(initial))?);
-                let registrar = Registrar::new(Options { given, ..self.options.clone() }).map_err(fail)?;
-                registrar.register(&source.cloud, &target.cloud).map_err(fail)?
+                let given = transform::read(&self.pairs.path(initial))?;
+                let target = self.registrar.prepare(&target.cloud).map_err(fail)?;
+                self.registrar.register_from(&source.cloud, &target, &given).map_err(fail)?
             }
         };
         let dropped = [source.dropped, target.dropped];

@@ -16,6 +16,7 @@ mod interrupt;
 mod method;
 mod page;
 mod register;
+mod rrd;
 mod say;
 mod skeleton;
 mod statistics;
@@ -44,7 +45,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Register(register::RegisterArgs),
+    Register(Box<register::RegisterArgs>),
     Inspect(inspect::InspectArgs),
     Batch(batch::BatchArgs),
     View(view::ViewArgs),

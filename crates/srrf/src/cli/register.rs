@@ -15,7 +15,7 @@ use super::files::{self, Input};
 use super::method::MethodArgs;
 use super::page::{self, PageArgs};
 use super::say::Voice;
-use super::{Common, EXIT_CODES, summary, transform};
+use super::{Common, EXIT_CODES, rrd, summary, transform};
 
 /// The exit code of an answer that is probably wrong.
 const ABSTAINED: u8 = 3;
@@ -48,6 +48,10 @@ pub struct RegisterArgs {
     /// Write a page that shows the answer, for any browser
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+
+    /// Write a Rerun recording (builds with the feature `rerun`)
+    #[arg(long, value_name = "FILE")]
+    rrd: Option<PathBuf>,
 
     /// A first guess: a file of the same kind as `--output` writes
     #[arg(long, value_name = "FILE")]
@@ -112,7 +116,8 @@ impl RegisterArgs {
                 "both clouds are `-`: standard input holds one; name a file for the other".into(),
             ));
         }
-        let outputs = [&self.output, &self.save, &self.json, &self.html];
+        self.rrd.as_deref().map_or(Ok(()), rrd::check)?;
+        let outputs = [&self.output, &self.save, &self.json, &self.html, &self.rrd];
         outputs.into_iter().flatten().try_for_each(|path| files::check_output(path))?;
         if let Some(path) = &self.save {
             files::check_cloud_output(path)?;
@@ -165,6 +170,10 @@ impl RegisterArgs {
             let html = page::of_outcome(outcome, source, target, given, &self.page);
             files::write(path, html.as_bytes())?;
             lines.push(wrote(path, "open it in a browser"));
+        }
+        if let Some(path) = &self.rrd {
+            rrd::write(path, outcome, source, target)?;
+            lines.push(wrote(path, "open it with `rerun`"));
         }
         Ok(lines)
     }
