@@ -20,7 +20,10 @@ const SEED: u64 = 77_002;
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let data = arguments.next().expect("usage: refine_choices MODELNET [SHAPES]");
+    let Some(data) = arguments.next() else {
+        println!("usage: refine_choices MODELNET [SHAPES]");
+        return;
+    };
     let count: usize = arguments.next().map_or(104, |n| n.parse().unwrap());
     let shapes = open(Path::new(&data), Split::Train).unwrap();
     let flex = device("flex").unwrap();
