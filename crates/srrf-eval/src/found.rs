@@ -121,7 +121,7 @@ mod pose {
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
-    use srrf_cloud::{Branch, EulerXyz, Skeletons};
+    use srrf_cloud::{Branch, EulerXyz, Skeleton, Skeletons};
 
     use super::*;
 
@@ -135,7 +135,10 @@ mod tests {
         broken.translation.y = f64::NEG_INFINITY;
         let found = Registration {
             branches: vec![Branch { name: "left", target_from_source: broken, inlier_ratio: 0.5 }],
-            skeletons: Some(Skeletons { source: vec![[0.1, 0.2, 0.3]], target: vec![[1.0; 3], [2.0; 3]] }),
+            skeletons: Some(Skeletons {
+                source: Skeleton { points: vec![[0.1, 0.2, 0.3]], radii: Vec::new() },
+                target: Skeleton { points: vec![[1.0; 3], [2.0; 3]], radii: Vec::new() },
+            }),
             iterations: 7,
             converged: false,
             ..Registration::from_pose(pose)

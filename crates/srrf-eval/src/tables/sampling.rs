@@ -107,7 +107,7 @@ impl PairSource for SampledPairs<'_> {
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::{RegisterError, Registration, Rigid, Skeletons};
+    use srrf_cloud::{RegisterError, Registration, Rigid, Skeleton, Skeletons};
     use srrf_corrupt::PairConfig;
 
     use super::*;
@@ -124,7 +124,10 @@ mod tests {
 
         fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
             let five = |cloud: &PointCloud| cloud.points()[..5].to_vec();
-            let skeletons = Some(Skeletons { source: five(source), target: five(target) });
+            let skeletons = Some(Skeletons {
+                source: Skeleton { points: five(source), radii: Vec::new() },
+                target: Skeleton { points: five(target), radii: Vec::new() },
+            });
             Ok(Registration { skeletons, ..Registration::from_pose(Rigid::identity()) })
         }
     }
