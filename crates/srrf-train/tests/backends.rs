@@ -30,7 +30,7 @@ use srrf_train::step::{StepContext, Workers, gradient, to_shard};
 const FORWARD: f64 = 1e-4;
 const GRADIENT: f64 = 1e-3;
 const LOSSES: f64 = 1e-3;
-const MOVED: f64 = 3e-2;
+const MOVED: f64 = 1e-2;
 
 const PAIRS: usize = 3;
 const STEPS: usize = 5;
