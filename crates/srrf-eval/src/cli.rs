@@ -58,7 +58,7 @@ pub struct Options {
     #[arg(long, value_name = "NAME", default_value = "flex")]
     pub device: String,
 
-    /// Trained weights of srrf: a file, or `srrf-small`, `srrf-small-start` or `srrf-shapes` in the program [default:
+    /// Trained weights of srrf: a file, or `srrf-small` or `srrf-shapes` in the program [default:
     /// srrf-small]; or METHOD=PATH for those of a learned baseline. May be given more than once
     #[arg(long, value_name = "PATH")]
     pub weights: Vec<String>,

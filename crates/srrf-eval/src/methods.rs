@@ -149,10 +149,12 @@ fn srrf(context: &MethodContext) -> Result<(SrrfRegister, String), String> {
 pub(crate) fn network(context: &MethodContext) -> Result<(LoadedModel, String), String> {
     let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
     let (loaded, origin) = match context.weights.get("srrf") {
-        Some(path) => match path.to_str().and_then(|name| embedded::load(name, &device)) {
-            Some(loaded) => (loaded, "in the program".to_owned()),
-            None => (weights::load(path, &device), path.display().to_string()),
-        },
+        Some(path) => {
+            let name = path.to_string_lossy();
+            let inside = embedded::names().any(|known| known == name);
+            let origin = if inside { "in the program".to_owned() } else { name.to_string() };
+            (embedded::open(&name, &device), origin)
+        }
         None => (embedded::load_default(&device), "in the program".to_owned()),
     };
     let loaded = loaded.map_err(|e| e.to_string())?;

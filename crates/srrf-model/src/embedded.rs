@@ -1,14 +1,15 @@
 //! Weights that ship inside the library.
 
+use std::path::Path;
+
 use burn::tensor::Device;
 
-use crate::weights::{LoadedModel, WeightsError, from_safetensors};
+use crate::weights::{self, LoadedModel, WeightsError, from_safetensors};
 
 /// Names of the embedded models with their files; the model cards lie beside them in `weights/`.
 /// The first is the default.
 const EMBEDDED: &[(&str, &[u8])] = &[
     ("srrf-small", include_bytes!("../weights/srrf-small.safetensors")),
-    ("srrf-small-start", include_bytes!("../weights/srrf-small-start.safetensors")),
     ("srrf-shapes", include_bytes!("../weights/srrf-shapes.safetensors")),
 ];
 
@@ -17,12 +18,27 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     EMBEDDED.iter().map(|(name, _)| *name)
 }
 
-/// An embedded model by name: `srrf-small` (trained on ModelNet40, the default), `srrf-small-start`
-/// (what its training started from) or `srrf-shapes` (trained on the built-in shapes). `None` if there
-/// is no model of that name.
+/// An embedded model by name: `srrf-small` (trained on ModelNet40, the default) or `srrf-shapes` (trained on
+/// the built-in shapes). `None` if there is no model of that name. What `srrf-small` was trained from lies
+/// beside it as files, `srrf-small-start` and `srrf-small-2`.
 pub fn load(name: &str, device: &Device) -> Option<Result<LoadedModel, WeightsError>> {
     let (name, bytes) = EMBEDDED.iter().find(|(known, _)| *known == name)?;
     Some(from_safetensors(bytes, &format!("embedded weights {name}"), device))
+}
+
+/// The weights that a user names: a model in the program, or a file.
+///
+/// # Errors
+/// [`WeightsError::Unknown`] where there is neither, and others for a file that cannot be used.
+pub fn open(name: &str, device: &Device) -> Result<LoadedModel, WeightsError> {
+    if let Some(loaded) = load(name, device) {
+        return loaded;
+    }
+    if !Path::new(name).exists() {
+        let known = names().collect::<Vec<_>>().join(", ");
+        return Err(WeightsError::Unknown { name: name.to_owned(), known });
+    }
+    weights::load(Path::new(name), device)
 }
 
 /// The default model, `srrf-small`.
@@ -45,8 +61,11 @@ mod tests {
         for name in names() {
             assert_eq!(load(name, &device).unwrap().unwrap().name, name);
         }
-        assert_eq!(names().count(), 3);
+        assert_eq!(names().count(), 2);
         assert!(load("srrf-large", &device).is_none());
+        assert_eq!(open("srrf-shapes", &device).unwrap().name, "srrf-shapes");
+        let unknown = open("srrf-large", &device).unwrap_err().to_string();
+        assert!(unknown.contains("srrf-large: no such file") && unknown.contains("srrf-shapes"), "{unknown}");
         assert_eq!(load_default(&device).unwrap().name, "srrf-small");
     }
 }

@@ -28,6 +28,14 @@ pub enum WeightsError {
         #[source]
         source: std::io::Error,
     },
+    /// There is neither a file nor a model in the program of that name.
+    #[error("{name}: no such file, and no model of that name in the program (it has {known})")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The names of the models in the program.
+        known: String,
+    },
     /// The bytes are no safetensors file, or a truncated one.
     #[error("{origin}: not a complete safetensors file: {source}")]
     Format {

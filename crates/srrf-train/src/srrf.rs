@@ -1,12 +1,11 @@
 //! How the SRRF network is trained.
 
-use std::path::Path;
 
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};
 use srrf_cloud::Rigid;
-use srrf_model::weights::{WeightsError, load};
+use srrf_model::weights::WeightsError;
 use srrf_model::{
     BranchOutput, Skeleton, Srrf, SrrfConfig, chamfer, correspondence_loss, embedded, registration_loss,
     skeleton_loss, spread, transform,
@@ -24,11 +23,7 @@ impl Trained for SrrfConfig {
         &["sem", "chamfer", "dense_correspondence", "skeleton_correspondence"];
 
     fn start(start: &str, device: &Device) -> Result<Srrf, WeightsError> {
-        let loaded = match embedded::load(start, device) {
-            Some(loaded) => loaded?,
-            None => load(Path::new(start), device)?,
-        };
-        Ok(loaded.model)
+        Ok(embedded::open(start, device)?.model)
     }
 
     fn wrong_stage(stage: &StageConfig) -> Option<(&'static str, &'static str)> {

@@ -1,9 +1,7 @@
 //! The network as a source of starts.
 
-use std::path::Path;
-
 use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid, voxel_downsample};
-use srrf_model::weights::{self, LoadedModel};
+use srrf_model::weights::LoadedModel;
 use srrf_model::{SrrfRegister, embedded};
 
 /// Points of the cloud that the network chooses its 1,024 from: enough to look evenly over a scan.
@@ -69,21 +67,8 @@ impl Network {
 /// In words, with the file and the way out.
 pub fn open(from: Option<&str>, device: &str) -> Result<LoadedModel, String> {
     let device = srrf_model::device(device).map_err(|e| e.to_string())?;
-    let loaded = match from {
-        None => embedded::load_default(&device),
-        Some(name) => match embedded::load(name, &device) {
-            Some(loaded) => loaded,
-            None if Path::new(name).exists() => weights::load(Path::new(name), &device),
-            None => {
-                let known: Vec<&str> = embedded::names().collect();
-                return Err(format!(
-                    "--weights {name}: no such file, and no model of that name in the program (it has {})",
-                    known.join(", ")
-                ));
-            }
-        },
-    };
-    loaded.map_err(|e| e.to_string())
+    let loaded = from.map_or_else(|| embedded::load_default(&device), |name| embedded::open(name, &device));
+    loaded.map_err(|e| format!("--weights {e}"))
 }
 
 /// An even part of a large cloud: voxel centroids, [`THINNED`] or fewer. A cloud that is small already

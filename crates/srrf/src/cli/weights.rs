@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
-use srrf_model::weights::{LoadedModel, load, parameters};
+use srrf_model::weights::{LoadedModel, parameters};
 use srrf_model::{device, embedded};
 
 use super::failure::Failure;
@@ -14,7 +14,6 @@ use super::say::count;
 /// Model cards, by the name of the model.
 const CARDS: &[(&str, &str)] = &[
     ("srrf-small", include_str!("../../../srrf-model/weights/srrf-small.md")),
-    ("srrf-small-start", include_str!("../../../srrf-model/weights/srrf-small-start.md")),
     ("srrf-shapes", include_str!("../../../srrf-model/weights/srrf-shapes.md")),
 ];
 
@@ -114,12 +113,7 @@ fn verify(weights: &str, sha256: Option<&str>) -> Result<String, Failure> {
 
 fn open(weights: &str) -> Result<LoadedModel, Failure> {
     let device = device("flex").map_err(|e| Failure::Other(e.to_string()))?;
-    let loaded = match embedded::load(weights, &device) {
-        Some(loaded) => loaded,
-        None if Path::new(weights).exists() => load(Path::new(weights), &device),
-        None => return Err(unknown(weights)),
-    };
-    loaded.map_err(|e| Failure::Usage(e.to_string()))
+    embedded::open(weights, &device).map_err(|e| Failure::Usage(e.to_string()))
 }
 
 fn parameter_count(loaded: &LoadedModel) -> usize {
