@@ -1,6 +1,5 @@
 //! How the SRRF network is trained.
 
-
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};

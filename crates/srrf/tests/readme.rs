@@ -43,7 +43,9 @@ fn the_first_command_says_what_the_readme_says() {
 /// The same words, and numbers that are nearly the same.
 fn alike(a: &str, b: &str) -> bool {
     let words = |line: &str| -> Vec<String> {
-        line.split_whitespace().map(|w| w.trim_matches(&['(', ')', ',', ';', '°'][..]).replace(',', "")).collect()
+        line.split_whitespace()
+            .map(|w| w.trim_matches(&['(', ')', ',', ';', '°'][..]).replace(',', ""))
+            .collect()
     };
     let (a, b) = (words(a), words(b));
     a.len() == b.len()
