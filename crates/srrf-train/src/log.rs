@@ -155,6 +155,17 @@ fn round(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
 
+/// A validation in one line.
+pub fn summary(step: usize, epoch: f64, result: &Validation, rows: &[&str]) -> String {
+    let row = |name: &&str| {
+        let s = &result.scores[name];
+        format!("{name} {:.2}/{:.2}/{:.2}", s.rmse_r, s.mae_r, s.median_rot_deg)
+    };
+    let rows = rows.iter().map(row).collect::<Vec<_>>().join(", ");
+    let notes: String = result.notes.iter().map(|(name, value)| format!(", {name} {value:.3}")).collect();
+    format!("step {step}, epoch {epoch:.2}: RMSE/MAE/median of R in degrees: {rows}{notes}")
+}
+
 /// The progress bar of a run, on standard error.
 pub fn progress_bar(steps: usize, done: usize) -> ProgressBar {
     let bar = ProgressBar::new(steps as u64).with_position(done as u64);

@@ -16,7 +16,7 @@ use srrf_model::weights::{parameters, to_safetensors, with_parameters, write_ato
 use crate::checkpoint::{self, CheckpointError, Progress};
 use crate::config::{DataSource, TrainConfig};
 use crate::data::TrainingPairs;
-use crate::log::{Log, progress_bar};
+use crate::log::{Log, progress_bar, summary};
 use crate::network::Trained;
 use crate::optimizer::optimizer;
 use crate::resources::cpu_seconds;
@@ -388,14 +388,4 @@ fn message(
     let total = losses.get("total").copied().unwrap_or(f64::NAN);
     let pairs = bar.per_sec() * batch as f64;
     format!("{stage}  epoch {epoch:.2}  loss {total:.4}  lr {rate:.1e}  {pairs:.1} pairs/s")
-}
-
-fn summary(step: usize, epoch: f64, result: &Validation, rows: &[&str]) -> String {
-    let row = |name: &&str| {
-        let s = &result.scores[name];
-        format!("{name} {:.2}/{:.2}/{:.2}", s.rmse_r, s.mae_r, s.median_rot_deg)
-    };
-    let rows = rows.iter().map(row).collect::<Vec<_>>().join(", ");
-    let notes: String = result.notes.iter().map(|(name, value)| format!(", {name} {value:.3}")).collect();
-    format!("step {step}, epoch {epoch:.2}: RMSE/MAE/median of R in degrees: {rows}{notes}")
 }
