@@ -220,13 +220,7 @@ impl Options {
 
     /// `--weights` by method: `METHOD=PATH`, or a path alone for srrf.
     pub fn weights_by_method(&self) -> BTreeMap<String, PathBuf> {
-        let split = |text: &String| match text.split_once('=') {
-            Some((method, path)) if METHODS.iter().any(|m| m.name == method) => {
-                (method.to_owned(), path.into())
-            }
-            _ => ("srrf".to_owned(), text.into()),
-        };
-        self.weights.iter().map(split).collect()
+        weights_by_method(&self.weights)
     }
 
     /// Number of worker threads.
@@ -240,6 +234,15 @@ impl Options {
             None => Ok(std::thread::available_parallelism().map_or(1, usize::from)),
         }
     }
+}
+
+/// Weights by method: `METHOD=PATH`, or a path alone for srrf.
+pub(crate) fn weights_by_method(weights: &[String]) -> BTreeMap<String, PathBuf> {
+    let split = |text: &String| match text.split_once('=') {
+        Some((method, path)) if METHODS.iter().any(|m| m.name == method) => (method.to_owned(), path.into()),
+        _ => ("srrf".to_owned(), text.into()),
+    };
+    weights.iter().map(split).collect()
 }
 
 /// A switch of [`PairConfig`] by its name in configs.

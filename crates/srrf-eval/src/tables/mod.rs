@@ -26,7 +26,8 @@ use std::collections::BTreeMap;
 pub use options::TablesOptions;
 
 use crate::cache::Cache;
-use crate::methods::{Method, MethodContext};
+use crate::cli::weights_by_method;
+use crate::methods::{METHODS, Method, MethodContext};
 use crate::pairs::PairSource;
 use crate::run::{Outcome, Run};
 use crate::summary::Summary;
@@ -77,7 +78,8 @@ struct Evidence {
 /// # Errors
 /// [`EvalError`] where data, weights or folders cannot be used.
 pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, EvalError> {
-    let context = MethodContext::of_srrf(options.weights.clone(), &options.device);
+    let weights = weights_by_method(&options.weights);
+    let context = MethodContext { weights, device: options.device.clone() };
     let cast = Cast::new(&options.methods, &context)?;
     crate::report::prepare(&options.out)?;
     let cache = Cache::open(&options.cache_folder(), &options.device)?;
@@ -140,44 +142,32 @@ impl Stage<'_> {
         Ok(Measured { summary: Summary::of(&outcome)?, outcome, data: pairs.description() })
     }
 
-    /// The network with the weights of the other tables: trained clean, trained without the loss.
+    /// The models of the other tables: trained clean, and the network trained without the loss.
     fn other_weights(&self, evidence: &mut Evidence, say: Listener<'_>) -> Result<(), EvalError> {
         let options = self.options;
+        let main = plan::main_protocol(options, self.shapes);
+        let middle = Protocol { severities: vec![plan::MIDDLE], ..main.clone() };
+        let no_ddl = model_or(options.no_ddl_weights.as_deref(), "srrf-no-ddl");
+        let no_ddl = no_ddl.map(|path| ("srrf".to_owned(), path)).into_iter().collect();
         let wanted = [
-            (
-                "clean-trained",
-                "models trained clean",
-                &options.clean_weights,
-                "srrf-clean",
-                "--clean-weights",
-            ),
-            (
-                "table5",
-                "skeletons without the loss",
-                &options.no_ddl_weights,
-                "srrf-no-ddl",
-                "--no-ddl-weights",
-            ),
+            ("clean-trained", "models trained clean", options.clean_models(), main, "--clean-weights"),
+            ("table5", "skeletons without the loss", no_ddl, middle, "--no-ddl-weights"),
         ];
-        for (key, title, option, name, switch) in wanted {
-            if !options.wants(key) {
-                continue;
-            }
-            let Some(weights) = model_or(option.as_deref(), name) else {
-                let reason = format!("no weights `{name}` in the program; give a file with {switch}");
+        for (key, title, weights, protocol, switch) in wanted.into_iter().filter(|w| options.wants(w.0)) {
+            if weights.is_empty() {
+                let reason = format!("no such weights are in the program; give a file with {switch}");
                 evidence.missing.push((title.to_owned(), reason));
                 continue;
-            };
-            let context = MethodContext::of_srrf(Some(weights), &options.device);
-            let cast = Cast::new(&NETWORK_ROWS.map(str::to_owned), &context)?;
-            let mut protocol = plan::main_protocol(options, self.shapes);
-            if key == "table5" {
-                protocol.severities = vec![plan::MIDDLE];
             }
+            let entries = METHODS.iter().filter(|m| weights.contains_key(m.name));
+            let rows: Vec<String> = entries.flat_map(|m| m.rows).map(|row| (*row).to_owned()).collect();
+            let context = MethodContext { weights, device: options.device.clone() };
+            let cast = Cast::new(&rows, &context)?;
             let measured =
                 self.score(title, &self.pairs(protocol)?, &cast.methods, cast.rows.clone(), say)?;
             evidence.parts.insert(key, measured);
-            evidence.cast.weights.extend(cast.weights.into_values().map(|w| (title.to_owned(), w)));
+            let named = |(method, weights)| (format!("{method}, {title}"), weights);
+            evidence.cast.weights.extend(cast.weights.into_iter().map(named));
         }
         Ok(())
     }

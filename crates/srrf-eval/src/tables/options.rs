@@ -1,8 +1,12 @@
 //! The options of `srrf-eval tables`.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
+
+use super::cast::model_or;
+use crate::cli::weights_by_method;
 
 /// Makes all tables and figures of the report: the paper's tables 1 to 5 with its own numbers beside
 /// ours, the ablations that need no training, severity curves, and one page to look at it all.
@@ -31,14 +35,15 @@ pub struct TablesOptions {
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PARTS)]
     pub parts: Vec<String>,
 
-    /// Trained weights: a file, or the name of a model in the program [default: srrf-small]
+    /// Trained weights of srrf: a file, or the name of a model in the program [default: srrf-small]; or
+    /// METHOD=PATH for those of a learned baseline. May be given more than once
     #[arg(long, value_name = "PATH")]
-    pub weights: Option<PathBuf>,
+    pub weights: Vec<String>,
 
-    /// Weights that were trained on clean pairs only, for the tables of models trained clean [default:
-    /// srrf-clean, if the program has it]
+    /// Weights that were trained on clean pairs only, in the same form, for the tables of models trained
+    /// clean [default: srrf-clean, if the program has it]
     #[arg(long, value_name = "PATH")]
-    pub clean_weights: Option<PathBuf>,
+    pub clean_weights: Vec<String>,
 
     /// Weights that were trained without the distribution distance loss, for table 5 [default:
     /// srrf-no-ddl, if the program has it]
@@ -107,6 +112,15 @@ fn named_weights(text: &str) -> Result<(String, PathBuf), String> {
 }
 
 impl TablesOptions {
+    /// The models trained clean, by method; empty where there are none.
+    pub(crate) fn clean_models(&self) -> BTreeMap<String, PathBuf> {
+        let mut models = weights_by_method(&self.clean_weights);
+        if let (true, Some(name)) = (models.is_empty(), model_or(None, "srrf-clean")) {
+            models.insert("srrf".to_owned(), name);
+        }
+        models
+    }
+
     /// Whether a part is to be made.
     pub(crate) fn wants(&self, part: &str) -> bool {
         self.parts.is_empty() || self.parts.iter().any(|p| p == part)
