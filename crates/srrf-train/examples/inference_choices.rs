@@ -39,8 +39,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         (1, 256, nearest, 0.05),
         (2, 128, nearest, 0.05),
         (2, 256, nearest, 0.05),
-        (2, 256, nearest, 0.1),
+        (2, 256, nearest, 0.03),
+        (2, 512, nearest, 0.05),
         (2, 256, soft, 0.05),
+        (3, 256, nearest, 0.05),
     ] {
         let device = device("flex")?;
         let mut loaded = weights::load(Path::new(weights_path), &device)?;
