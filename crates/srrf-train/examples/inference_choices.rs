@@ -32,28 +32,35 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         pairs.description(),
         held_out.len()
     );
-    println!("| passes | tokens | inlier test | dense | skeleton | fused |\n|---|---|---|---|---|---|");
+    println!(
+        "| passes | tokens | inlier test | sharpness | dense | skeleton | fused |\n|---|---|---|---|---|---|---|"
+    );
     let (nearest, soft) = (InlierTest::Nearest, InlierTest::SoftMatch);
-    for (passes, tokens, test, threshold) in [
-        (1, 128, nearest, 0.05),
-        (1, 256, nearest, 0.05),
-        (2, 128, nearest, 0.05),
-        (2, 256, nearest, 0.05),
-        (2, 256, nearest, 0.03),
-        (2, 512, nearest, 0.05),
-        (2, 256, soft, 0.05),
-        (3, 256, nearest, 0.05),
+    for (passes, tokens, test, threshold, sharpness) in [
+        (1, 128, nearest, 0.05, 1.0),
+        (1, 256, nearest, 0.05, 1.0),
+        (2, 128, nearest, 0.05, 1.0),
+        (2, 256, nearest, 0.05, 1.0),
+        (2, 256, nearest, 0.03, 1.0),
+        (2, 256, nearest, 0.05, 4.0),
+        (2, 256, nearest, 0.03, 4.0),
+        (2, 256, nearest, 0.05, 16.0),
+        (2, 256, soft, 0.05, 1.0),
+        (2, 256, soft, 0.05, 4.0),
+        (2, 512, nearest, 0.05, 1.0),
+        (3, 256, nearest, 0.05, 1.0),
     ] {
         let device = device("flex")?;
         let mut loaded = weights::load(Path::new(weights_path), &device)?;
         loaded.model.dense = loaded.model.dense.with_tokens(tokens);
         loaded.config.integration.test = test;
+        loaded.config.integration.sharpness = sharpness;
         loaded.config.integration.dense_threshold = threshold;
         loaded.config.integration.skeleton_threshold = if test == soft { 0.1 } else { threshold };
         let mut method = SrrfRegister::new(loaded, device);
         method.passes = passes;
         let rows = score(&method, &held_out, &workers)?;
-        println!("| {passes} | {tokens} | {test:?} {threshold} | {} |", rows.join(" | "));
+        println!("| {passes} | {tokens} | {test:?} {threshold} | {sharpness} | {} |", rows.join(" | "));
     }
     Ok(())
 }
