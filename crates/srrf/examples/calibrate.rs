@@ -69,6 +69,8 @@ fn main() {
 
     println!("the file that was in the program, on all pairs:");
     reliability(examples.iter().map(|e| (e.probability, e.right)));
+    println!("the file that was in the program, on the held-out pairs:");
+    reliability(held_out.iter().map(|(_, e)| (e.probability, e.right)));
     println!("the new file, on the held-out pairs:");
     reliability(held_out.iter().map(|(_, e)| (model.probability(&e.features), e.right)));
     println!(
