@@ -17,7 +17,7 @@ pub fn programs() -> &'static Path {
         // The tests' own binary lies in TARGET/PROFILE/deps; `cargo test` built the same profile.
         let test = std::env::current_exe().expect("a test has a path");
         let folder = test.ancestors().nth(2).expect("TARGET/PROFILE").to_path_buf();
-        let status = Command::new(env!("CARGO"))
+        let status = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
             .args(["build", "--workspace", "--bins", "--locked", "--quiet"])
             .current_dir(workspace())
             .stdin(Stdio::null())
@@ -30,10 +30,17 @@ pub fn programs() -> &'static Path {
 
 /// The root of the workspace.
 ///
+/// Asked for when the test runs: one target folder may serve several checkouts, and would remember the path of
+/// another one.
+///
 /// # Panics
-/// Never, for this crate lies one level below it.
+/// When cargo does not run the test.
 pub fn workspace() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace")
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let here = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo runs the test"));
+        here.parent().expect("this crate lies one level below it").to_path_buf()
+    })
 }
 
 /// A program, run in the workspace's root and without a data set.

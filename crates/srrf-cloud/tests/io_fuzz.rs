@@ -21,7 +21,7 @@ use srrf_cloud::io::{format_names, write_cloud_to};
 
 /// The folder of the seeds, a folder for each parser.
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds")
+    Path::new(&std::env::var("CARGO_MANIFEST_DIR").unwrap()).join("../../fuzz/seeds")
 }
 
 /// Small files of every flavour by parser, with their names.

@@ -41,7 +41,7 @@ type Numbers = BTreeMap<String, Vec<f64>>;
 
 /// The smoke configuration with whole clouds, so that every shard has the same shapes, and small batches.
 fn config() -> TrainConfig {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/smoke.toml");
+    let path = Path::new(&std::env::var("CARGO_MANIFEST_DIR").unwrap()).join("../../configs/smoke.toml");
     let mut config = <TrainConfig>::read(&path).unwrap();
     config.draw.independent = 0.0;
     (config.optimizer.batch, config.optimizer.shard) = (4, 2);

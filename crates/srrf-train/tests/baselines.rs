@@ -17,7 +17,7 @@ use srrf_train::run::{Existing, RunOptions, run};
 const MOST_BYTES: usize = 8_000_000;
 
 fn configs() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs")
+    Path::new(&std::env::var("CARGO_MANIFEST_DIR").unwrap()).join("../../configs")
 }
 
 /// A configuration has the pairs and the validation of SRRF's, and weights that are not too many.

@@ -71,7 +71,8 @@ fn weights_are_listed_shown_and_checked() {
     let list = scene.srrf(&["weights"]).ok().out;
     assert!(list.contains("srrf-small") && list.contains("the default") && list.contains("srrf-shapes"));
     assert!(scene.srrf(&["weights", "show", "srrf-small"]).ok().out.contains("What it is good for"));
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../srrf-model/weights/srrf-shapes.safetensors");
+    let here = std::env::var("CARGO_MANIFEST_DIR").unwrap();
+    let file = &format!("{here}/../srrf-model/weights/srrf-shapes.safetensors")[..];
     let verified = scene.srrf(&["weights", "verify", file]).ok().out;
     assert!(verified.contains("the same as srrf-shapes"), "{verified}");
 
