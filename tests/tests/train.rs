@@ -101,7 +101,7 @@ fn bad_configurations_are_refused_by_key() {
         ("clean = 0.1", "clean = 1.5", &["bad.toml", "draw.clean", "between 0 and 1"][..]),
         ("epochs = 2.4", "epochs = -1", &["bad.toml", "stages[2].epochs"][..]),
         ("heads = 2, mlp", "heads = 3, mlp", &["bad.toml", "sfe.heads", "divide"][..]),
-        ("kind = \"adam\"", "kind = \"sgd\"", &["bad.toml", "unknown variant `sgd`"][..]),
+        ("kind = \"adam\"", "kind = \"lion\"", &["bad.toml", "unknown variant `lion`"][..]),
     ] {
         assert!(text.contains(from), "{from}");
         std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
