@@ -3,7 +3,7 @@
 //! 1. `cast` sets up the methods, `plan` says which pairs each experiment scores;
 //! 2. every experiment goes through [`Run`] and the [`Cache`], the same path as the plain command;
 //! 3. `sheets`, `figures` and `chosen` make tables, pictures and views from the summaries;
-//! 4. `report` joins them into a [`document::Document`], and `write` puts it into the folder.
+//! 4. `report` joins them into a `document::Document`, and `write` puts it into the folder.
 
 mod cast;
 mod chosen;
