@@ -45,7 +45,7 @@ pub(crate) fn edges(tokens: &Tensor<3>, cloud: &Tensor<3>, k: usize) -> Tensor<2
     let ([clouds, n, _], [_, points, _]) = (tokens.dims(), cloud.dims());
     let (host_tokens, host_cloud) = (HostClouds::read(tokens), HostClouds::read(cloud));
     let supports: Vec<_> = host_cloud.iter().collect();
-    let neighbours = flat_indices(host_tokens.iter(), points, |i, tokens| k_nearest(tokens, supports[i], k));
+    let neighbours = flat_indices(&host_tokens, points, |i, tokens| k_nearest(tokens, supports[i], k));
     let neighbours = rows(cloud.clone().reshape([clouds * points, 3]), &neighbours);
     let centres = tokens.clone().reshape([clouds * n, 1, 3]).repeat_dim(1, k).reshape([clouds * n * k, 3]);
     Tensor::cat(vec![neighbours, centres], 1)

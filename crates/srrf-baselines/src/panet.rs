@@ -145,7 +145,7 @@ impl PanetConfig {
         let (host_tokens, host) = (HostClouds::read(&tokens), HostClouds::read(&clouds));
         let supports: Vec<_> = host.iter().collect();
         let k = self.scales[0];
-        let found = flat_indices(host_tokens.iter(), points, |i, tokens| k_nearest(tokens, supports[i], k));
+        let found = flat_indices(&host_tokens, points, |i, tokens| k_nearest(tokens, supports[i], k));
         rows(clouds.reshape([count * points, 3]), &found).reshape([count, n * k, 3])
     }
 

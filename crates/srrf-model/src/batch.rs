@@ -4,6 +4,8 @@ use burn::tensor::{Device, Tensor, TensorData};
 use nalgebra::{Matrix3, Vector3};
 use srrf_cloud::{PointCloud, Rigid};
 
+use crate::geometry::HostClouds;
+
 /// Root mean square radius that clouds have inside the network. Clouds of ModelNet40 in the unit
 /// sphere have about this one, so thresholds in network units read as shares of the radius.
 const NETWORK_RMS: f64 = 0.6;
@@ -69,6 +71,44 @@ impl PairFrame {
     }
 }
 
+/// A batch of pairs in network units, not yet on a device; every cloud has the same number of points.
+#[derive(Debug, Clone)]
+pub struct HostPairs {
+    /// The sources, and then the targets.
+    pub clouds: HostClouds,
+    /// One frame a pair.
+    pub frames: Vec<PairFrame>,
+}
+
+impl HostPairs {
+    /// Pairs of clouds in network units. `None` unless there is a pair and all clouds have the same number
+    /// of points.
+    pub fn new(pairs: &[(&PointCloud, &PointCloud)]) -> Option<Self> {
+        let points = pairs.first()?.0.len();
+        if pairs.iter().any(|(source, target)| source.len() != points || target.len() != points) {
+            return None;
+        }
+        let frames: Vec<PairFrame> =
+            pairs.iter().map(|(source, target)| PairFrame::new(source, target)).collect();
+        let mut clouds = Vec::with_capacity(2 * pairs.len() * points);
+        for ((x, _), frame) in pairs.iter().zip(&frames) {
+            clouds.extend(x.points().iter().map(|p| frame.source(p).map(|v| v as f32)));
+        }
+        for ((_, y), frame) in pairs.iter().zip(&frames) {
+            clouds.extend(y.points().iter().map(|p| frame.target(p).map(|v| v as f32)));
+        }
+        Some(Self { clouds: HostClouds::new(clouds, points), frames })
+    }
+
+    /// The pairs on a device.
+    pub fn upload(&self, device: &Device) -> PairBatch {
+        let shape = [self.frames.len(), self.clouds.per_cloud(), 3];
+        let (source, target) = self.clouds.flat().split_at(shape.iter().product());
+        let tensor = |values: &[f32]| Tensor::<3>::from_data(TensorData::new(values.to_vec(), shape), device);
+        PairBatch { source: tensor(source), target: tensor(target), frames: self.frames.clone() }
+    }
+}
+
 /// A batch of pairs on a device, every cloud with the same number of points.
 #[derive(Debug, Clone)]
 pub struct PairBatch {
@@ -84,21 +124,7 @@ impl PairBatch {
     /// Brings pairs of clouds to the device. `None` unless there is a pair and all clouds have the
     /// same number of points.
     pub fn new(pairs: &[(&PointCloud, &PointCloud)], device: &Device) -> Option<Self> {
-        let points = pairs.first()?.0.len();
-        if pairs.iter().any(|(source, target)| source.len() != points || target.len() != points) {
-            return None;
-        }
-        let frames: Vec<PairFrame> =
-            pairs.iter().map(|(source, target)| PairFrame::new(source, target)).collect();
-        let shape = [pairs.len(), points, 3];
-        let tensor = |values: Vec<f32>| Tensor::<3>::from_data(TensorData::new(values, shape), device);
-        let mut source = Vec::with_capacity(shape.iter().product());
-        let mut target = Vec::with_capacity(shape.iter().product());
-        for ((x, y), frame) in pairs.iter().zip(&frames) {
-            source.extend(x.points().iter().flat_map(|p| frame.source(p)).map(|v| v as f32));
-            target.extend(y.points().iter().flat_map(|p| frame.target(p)).map(|v| v as f32));
-        }
-        Some(Self { source: tensor(source), target: tensor(target), frames })
+        HostPairs::new(pairs).map(|pairs| pairs.upload(device))
     }
 
     /// True poses, in network units, as tensors `[batch, 3, 3]` and `[batch, 3]`.

@@ -6,8 +6,9 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::confidence::Confidence;
-use crate::geometry::even_tokens;
+use crate::geometry::{HostClouds, rows};
 use crate::integration::BranchPose;
+use crate::layout::BranchLayout;
 use crate::matching::SoftMatching;
 use crate::pfi::{Pfi, PfiConfig};
 use crate::procrustes::{procrustes, weighted_procrustes};
@@ -94,10 +95,28 @@ impl Branch {
     /// # Shapes
     /// - `source`, `target`: `[batch, points, 3]`, of equal numbers of points
     pub fn forward(&self, source: Tensor<3>, target: Tensor<3>, phase: f32) -> BranchOutput {
-        let [batch, _, _] = source.dims();
-        let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
-        let tokens = even_tokens(clouds.clone(), self.tokens, phase); // [2 batch, n, 3]
-        let features = self.sfe.forward(tokens.clone(), clouds); // F
+        let clouds = Tensor::cat(vec![source, target], 0);
+        let layout = self.layout(&HostClouds::read(&clouds), phase);
+        self.forward_with(clouds, &layout)
+    }
+
+    /// The layout of `clouds`, sources and then targets.
+    pub fn layout(&self, clouds: &HostClouds, phase: f32) -> BranchLayout {
+        BranchLayout::new(clouds, self.tokens, self.sfe.neighbours(), phase)
+    }
+
+    /// As [`Branch::forward`], of clouds whose layout is known.
+    ///
+    /// # Shapes
+    /// - `clouds`: `[2 batch, points, 3]`, sources and then targets
+    pub fn forward_with(&self, clouds: Tensor<3>, layout: &BranchLayout) -> BranchOutput {
+        let [both, points, _] = clouds.dims();
+        let (batch, n) = (both / 2, layout.per_cloud);
+        let tokens = match &layout.tokens {
+            Some(chosen) => rows(clouds.clone().reshape([both * points, 3]), chosen).reshape([both, n, 3]),
+            None => clouds.clone(),
+        };
+        let features = self.sfe.forward_with(clouds, n, &layout.neighbours); // F
         let features = self.pfi.forward(features, tokens.clone()); // Phi
         let half = |x: &Tensor<3>, which: usize| x.clone().narrow(0, which * batch, batch);
         let (source_points, target_points) = (half(&tokens, 0), half(&tokens, 1));

@@ -5,7 +5,10 @@
 //! point sampling, and an even subsample along a space-filling curve. All are deterministic, and
 //! the choice of points does not depend on their order in the cloud.
 
-use burn::tensor::{Int, Tensor, TensorData};
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+use burn::backend::DispatchDevice;
+use burn::tensor::{Device, Int, Tensor, TensorData};
+use rayon::prelude::*;
 
 use crate::fast::vectorized;
 
@@ -17,6 +20,21 @@ pub struct HostClouds {
 }
 
 impl HostClouds {
+    /// Clouds of `per_cloud` points, one after the other.
+    pub fn new(points: Vec<[f32; 3]>, per_cloud: usize) -> Self {
+        Self { points, per_cloud }
+    }
+
+    /// Points a cloud.
+    pub fn per_cloud(&self) -> usize {
+        self.per_cloud
+    }
+
+    /// The coordinates, point after point.
+    pub fn flat(&self) -> &[f32] {
+        self.points.as_flattened()
+    }
+
     /// Copies `clouds`, shape `[batch, points, 3]`.
     pub fn read(clouds: &Tensor<3>) -> Self {
         let [_, per_cloud, _] = clouds.dims();
@@ -108,18 +126,18 @@ fn squared(a: &[f32; 3], b: &[f32; 3]) -> f32 {
 }
 
 /// Row numbers into the flattened `[batch * points, channels]` table: `per_cloud(i)` gives the
-/// indices inside cloud `i`, which are shifted by `i * support_points`.
-pub fn flat_indices<'a>(
-    clouds: impl Iterator<Item = &'a [[f32; 3]]>,
+/// indices inside cloud `i`, which are shifted by `i * support_points`. Clouds are worked on side by side.
+pub fn flat_indices(
+    clouds: &HostClouds,
     support_points: usize,
-    mut per_cloud: impl FnMut(usize, &'a [[f32; 3]]) -> Vec<u32>,
+    per_cloud: impl Fn(usize, &[[f32; 3]]) -> Vec<u32> + Sync,
 ) -> Vec<i64> {
-    let mut out = Vec::new();
-    for (i, cloud) in clouds.enumerate() {
-        let base = (i * support_points) as i64;
-        out.extend(per_cloud(i, cloud).into_iter().map(|j| base + i64::from(j)));
-    }
-    out
+    let clouds: Vec<_> = clouds.iter().collect();
+    let found: Vec<Vec<u32>> = clouds.par_iter().enumerate().map(|(i, cloud)| per_cloud(i, cloud)).collect();
+    let shifted = |(i, rows): (usize, Vec<u32>)| {
+        rows.into_iter().map(move |j| (i * support_points) as i64 + i64::from(j))
+    };
+    found.into_iter().enumerate().flat_map(shifted).collect()
 }
 
 /// The `k` nearest distinct points of `support` for each of `queries`, nearest first, ties by
@@ -286,7 +304,7 @@ pub fn even_tokens(clouds: Tensor<3>, tokens: usize, phase: f32) -> Tensor<3> {
         return clouds;
     }
     let host = HostClouds::read(&clouds);
-    let chosen = flat_indices(host.iter(), points, |_, cloud| even_subsample(cloud, tokens, phase));
+    let chosen = flat_indices(&host, points, |_, cloud| even_subsample(cloud, tokens, phase));
     rows(clouds.reshape([batch * points, 3]), &chosen).reshape([batch, tokens, 3])
 }
 
@@ -305,8 +323,23 @@ fn morton(x: u32, y: u32, z: u32) -> u32 {
 /// The rows `indices` of `table`, shape `[rows, channels]` to `[indices.len(), channels]`.
 pub fn rows(table: Tensor<2>, indices: &[i64]) -> Tensor<2> {
     let device = table.device().without_autodiff();
-    let indices = Tensor::<1, Int>::from_data(TensorData::new(indices.to_vec(), [indices.len()]), &device);
+    let count = indices.len();
+    let indices = Tensor::<1, Int>::from_data(TensorData::new(indices.to_vec(), [count]), &device);
+    if on_cubecl(&device) {
+        // Its backward pass of `select` adds the rows one after the other; that of `gather` side by side.
+        let [_, channels] = table.dims();
+        return table.gather(0, indices.unsqueeze_dim::<2>(1).expand([count, channels]));
+    }
     table.select(0, indices)
+}
+
+/// Whether the device runs CubeCL's kernels.
+pub(crate) fn on_cubecl(device: &Device) -> bool {
+    match device.as_dispatch() {
+        #[cfg(any(feature = "wgpu", feature = "cuda"))]
+        DispatchDevice::Cube(_) => true,
+        _ => false,
+    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //! SO(3).
 
 use burn::tensor::{Tensor, TensorData};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{HostClouds, share_within};
@@ -121,7 +122,8 @@ impl IntegrationConfig {
             InlierTest::Nearest => {
                 let moved = HostClouds::read(&transform(source.clone().detach(), rotation, translation));
                 let target = HostClouds::read(target);
-                moved.iter().zip(target.iter()).map(|(a, b)| share_within(a, b, threshold as f32)).collect()
+                let clouds: Vec<_> = moved.iter().zip(target.iter()).collect();
+                clouds.par_iter().map(|(a, b)| share_within(a, b, threshold as f32)).collect()
             }
         }
     }

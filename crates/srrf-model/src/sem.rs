@@ -8,7 +8,8 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::fast::{Activation, gather_max, gather_relu, linear};
-use crate::geometry::{HostClouds, farthest_points, flat_indices, k_nearest, nearest, rows};
+use crate::geometry::{HostClouds, flat_indices, nearest, rows};
+use crate::layout::SemLayout;
 
 /// Sizes of one set-abstraction level.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -121,7 +122,18 @@ impl Sem {
     /// # Shapes
     /// - `clouds`: `[clouds, points, 3]`
     pub fn forward(&self, clouds: Tensor<3>) -> Skeleton {
-        let (samples, features) = self.encode(clouds);
+        let layout = self.layout(&HostClouds::read(&clouds));
+        self.forward_with(clouds, &layout)
+    }
+
+    /// The layout of `clouds`.
+    pub fn layout(&self, clouds: &HostClouds) -> SemLayout {
+        SemLayout::new(clouds, self.levels.iter().map(|level| (level.points, level.neighbours)))
+    }
+
+    /// As [`Sem::forward`], of clouds whose layout is known.
+    pub fn forward_with(&self, clouds: Tensor<3>, layout: &SemLayout) -> Skeleton {
+        let (samples, features) = self.encode(clouds, layout);
         let [batch, n, channels] = features.dims();
 
         // The head sees each point's feature, the cloud's, and where the point is.
@@ -146,26 +158,17 @@ impl Sem {
     }
 
     /// The sampled points `X*` and their contextual features.
-    fn encode(&self, clouds: Tensor<3>) -> (Tensor<3>, Tensor<3>) {
+    fn encode(&self, clouds: Tensor<3>, layout: &SemLayout) -> (Tensor<3>, Tensor<3>) {
         let [batch, mut n, _] = clouds.dims();
-        let mut host = HostClouds::read(&clouds);
         let mut xyz = clouds.reshape([batch * n, 3]);
         let mut features: Option<Tensor<2>> = None;
-        for level in &self.levels {
-            // Farthest point sampling, unless every point is kept.
-            let samples = level.points.min(n);
-            let (centres, host_centres) = if samples < n {
-                let chosen = flat_indices(host.iter(), n, |_, cloud| farthest_points(cloud, samples));
-                (rows(xyz.clone(), &chosen), host.select(&chosen, samples))
-            } else {
-                (xyz.clone(), host.clone())
+        for (level, layout) in self.levels.iter().zip(&layout.0) {
+            let centres = match &layout.chosen {
+                Some(chosen) => rows(xyz.clone(), chosen),
+                None => xyz.clone(),
             };
-            let supports: Vec<_> = host.iter().collect();
-            let neighbours = flat_indices(host_centres.iter(), n, |i, centre| {
-                k_nearest(centre, supports[i], level.neighbours)
-            });
-            let grouped = level.group(xyz, features, centres.clone(), &neighbours);
-            (xyz, features, host, n) = (centres, Some(grouped), host_centres, samples);
+            let grouped = level.group(xyz, features, centres.clone(), &layout.neighbours);
+            (xyz, features, n) = (centres, Some(grouped), layout.samples);
         }
         let features = features.unwrap_or_else(|| xyz.clone());
         let [_, channels] = features.dims();
@@ -232,7 +235,7 @@ pub(crate) fn nearest_rows(points: &Tensor<3>, support: &Tensor<3>) -> Vec<i64> 
     let [_, m, _] = support.dims();
     let (points, support) = (HostClouds::read(points), HostClouds::read(support));
     let supports: Vec<_> = support.iter().collect();
-    flat_indices(points.iter(), m, |i, cloud| nearest(cloud, supports[i]))
+    flat_indices(&points, m, |i, cloud| nearest(cloud, supports[i]))
 }
 
 /// Norm of each row, floored at 1e-6. Shape `[rows, 3]` to `[rows]`.
@@ -241,6 +244,18 @@ pub(crate) fn distance(difference: Tensor<2>) -> Tensor<1> {
 }
 
 impl Skeleton {
+    /// The skeletons of the sources and those of the targets, of a batch that holds both in turn.
+    pub fn halves(self) -> (Self, Self) {
+        let batch = self.points.dims()[0] / 2;
+        let half = |first: usize| Self {
+            points: self.points.clone().narrow(0, first, batch),
+            radii: self.radii.clone().narrow(0, first, batch),
+            weights: self.weights.clone().narrow(0, first, batch),
+            samples: self.samples.clone().narrow(0, first, batch),
+        };
+        (half(0), half(batch))
+    }
+
     /// The skeleton points, cut off from the gradient of the module that made them.
     pub fn detached_points(&self) -> Tensor<3> {
         self.points.clone().detach()

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::attention::EncoderLayer;
 use crate::fast::{Activation, linear};
-use crate::geometry::{HostClouds, flat_indices, k_nearest, rows};
+use crate::geometry::{HostClouds, rows};
+use crate::layout::Neighbourhood;
 
 /// Sizes of the structural feature extractor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -66,6 +67,11 @@ pub struct Sfe {
 }
 
 impl Sfe {
+    /// Neighbours that LFI joins.
+    pub(crate) fn neighbours(&self) -> usize {
+        self.neighbours
+    }
+
     /// Features of `tokens`. The first LFI joins the coordinates of the neighbours in the whole
     /// `cloud`, the later ones the features of the neighbours among the tokens.
     ///
@@ -74,19 +80,17 @@ impl Sfe {
     ///   point is a token)
     /// - output: `[clouds, n, layers * width]`
     pub fn forward(&self, tokens: Tensor<3>, cloud: Tensor<3>) -> Tensor<3> {
-        let [clouds, n, _] = tokens.dims();
-        let [_, points, _] = cloud.dims();
-        let (host_tokens, host_cloud) = (HostClouds::read(&tokens), HostClouds::read(&cloud));
-        let k = self.neighbours;
-        let neighbours = |support: &HostClouds, support_points: usize| {
-            let supports: Vec<_> = support.iter().collect();
-            flat_indices(host_tokens.iter(), support_points, |i, tokens| k_nearest(tokens, supports[i], k))
-        };
-        let in_cloud = neighbours(&host_cloud, points);
-        let in_tokens = neighbours(&host_tokens, n);
+        let [_, n, _] = tokens.dims();
+        let (tokens, host_cloud) = (HostClouds::read(&tokens), HostClouds::read(&cloud));
+        self.forward_with(cloud, n, &Neighbourhood::new(&tokens, &host_cloud, self.neighbours))
+    }
 
+    /// As [`Sfe::forward`], for `n` tokens a cloud of which it is known who their neighbours are.
+    pub fn forward_with(&self, cloud: Tensor<3>, n: usize, neighbours: &Neighbourhood) -> Tensor<3> {
+        let [clouds, points, _] = cloud.dims();
+        let k = self.neighbours;
         let mut table = cloud.reshape([clouds * points, 3]);
-        let mut indices = &in_cloud;
+        let mut indices = &neighbours.in_cloud;
         let mut outputs = Vec::with_capacity(self.layers.len());
         for layer in &self.layers {
             let [_, channels] = table.dims();
@@ -98,7 +102,7 @@ impl Sfe {
             let features = layer.encoder.forward(joined.reshape([clouds, n, width]));
             outputs.push(features.clone());
             table = features.reshape([clouds * n, width]);
-            indices = &in_tokens;
+            indices = &neighbours.in_tokens;
         }
         // F = LN(ReLU(Concat(F_2 .. F_{N_l + 1}))).
         self.norm.forward(relu(Tensor::cat(outputs, 2)))

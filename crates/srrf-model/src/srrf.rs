@@ -5,7 +5,9 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::branch::{Branch, BranchConfig, BranchOutput};
+use crate::geometry::HostClouds;
 use crate::integration::{Fusion, IntegrationConfig};
+use crate::layout::SrrfLayout;
 use crate::sem::{Sem, SemConfig, Skeleton};
 
 /// Sizes of the whole network.
@@ -72,17 +74,36 @@ impl Srrf {
         target: Tensor<3>,
         phase: f32,
     ) -> SrrfOutput {
-        // (1) Skeletal extraction, Eq. (5) and (6).
-        let source_skeleton = self.sem.forward(source.clone());
-        let target_skeleton = self.sem.forward(target.clone());
-        // The gradient stop between SEM and registration.
-        let (source_stopped, target_stopped) =
-            (source_skeleton.detached_points(), target_skeleton.detached_points());
-        // (2, 3) Features, interaction, matching and SVD: {R_s, t_s} and {R_c, t_c}.
-        let skeleton = self.skeleton.forward(source_stopped, target_stopped, phase);
-        let dense = self.dense.forward(source.clone(), target.clone(), phase);
+        let both = HostClouds::read(&Tensor::cat(vec![source.clone(), target.clone()], 0));
+        let layout =
+            SrrfLayout { sem: self.sem.layout(&both), dense: self.dense.layout(&both, phase), phase };
+        let (skeletons, skeleton, dense) = self.branches(source.clone(), target.clone(), &layout);
         // (4) Integration: {R, t} = lambda {R_c, t_c} + (1 - lambda) {R_s, t_s}.
         let fused = integration.fuse(dense.pose(), skeleton.pose(), &source, &target);
+        let (source_skeleton, target_skeleton) = skeletons;
         SrrfOutput { source_skeleton, target_skeleton, dense, skeleton, fused }
+    }
+
+    /// The stages before the integration, of clouds whose layout is known: the skeletons of source and
+    /// target, what the skeleton branch found, and what the dense branch found.
+    ///
+    /// # Shapes
+    /// - `source`, `target`: `[batch, points, 3]`
+    pub fn branches(
+        &self,
+        source: Tensor<3>,
+        target: Tensor<3>,
+        layout: &SrrfLayout,
+    ) -> ((Skeleton, Skeleton), BranchOutput, BranchOutput) {
+        let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
+        // (1) Skeletal extraction, Eq. (5) and (6).
+        let skeletons = self.sem.forward_with(clouds.clone(), &layout.sem);
+        // The gradient stop between SEM and registration.
+        let stopped = skeletons.detached_points();
+        let on_skeletons = self.skeleton.layout(&HostClouds::read(&stopped), layout.phase);
+        // (2, 3) Features, interaction, matching and SVD: {R_s, t_s} and {R_c, t_c}.
+        let skeleton = self.skeleton.forward_with(stopped, &on_skeletons);
+        let dense = self.dense.forward_with(clouds, &layout.dense);
+        (skeletons.halves(), skeleton, dense)
     }
 }

@@ -99,7 +99,7 @@ fn rows_and_host_copies_number_points_alike() {
     let host = HostClouds::read(&clouds);
     assert_eq!(host.iter().count(), batch);
     // Point 2 i + 1 of cloud i, then point 0.
-    let indices = flat_indices(host.iter(), points, |i, _| vec![2 * i as u32 + 1, 0]);
+    let indices = flat_indices(&host, points, |i, _| vec![2 * i as u32 + 1, 0]);
     assert_eq!(indices, [1, 0, 10, 7, 19, 14]);
     let picked = values(&rows(clouds.reshape([batch * points, 3]), &indices));
     let selected: Vec<f64> =

@@ -7,6 +7,7 @@ use burn::optim::GradientsParams;
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 use srrf_baselines::{LearnedConfig, Lesson, embedded};
+use srrf_model::geometry::HostClouds;
 use srrf_model::weights::{WeightsError, parse, read};
 use srrf_model::{NetworkConfig, WrongSize};
 
@@ -53,12 +54,17 @@ impl<C: LearnedConfig> Trained for Baseline<C> {
         (!stage.registration).then_some(("registration", "must be true, or the stage trains nothing"))
     }
 
+    type Layout = ();
+
+    fn layout(&self, _: &StageConfig, _: &HostClouds, _: f32) {}
+
     fn gradient(
         &self,
         losses: &C::Losses,
         _: &StageConfig,
         network: &C::Network,
         shard: Shard,
+        (): (),
     ) -> (GradientsParams, Losses) {
         let network = network.clone().train();
         let mut terms = Terms::default();

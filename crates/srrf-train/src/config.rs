@@ -153,6 +153,10 @@ pub struct DrawConfig {
     pub crop_keep: f64,
 }
 
+fn one() -> f64 {
+    1.0
+}
+
 fn default_crop_keep() -> f64 {
     0.7
 }
@@ -165,6 +169,10 @@ pub struct LossConfig {
     pub skeleton: SkeletonLossConfig,
     /// Weight of the correspondence loss of each branch; 0 is the paper.
     pub correspondence: f64,
+    /// Weight of `L_reg` of the fused pose, beside 1 for that of each branch. At 0 the integration is left
+    /// out of the training step, which saves its inlier test; the branches learn from their own poses.
+    #[serde(default = "one")]
+    pub fused: f64,
 }
 
 /// Optimiser and batches.

@@ -1,6 +1,7 @@
 //! Trains the SRRF network and the learned baselines: configuration, pairs, schedule, checkpoints, the
 //! loop. [`network`] is the seam between the loop and what it trains.
 
+pub mod ahead;
 pub mod baseline;
 pub mod checkpoint;
 pub mod config;

@@ -6,6 +6,7 @@ use burn::tensor::{Device, Tensor};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use srrf_cloud::Rigid;
+use srrf_model::geometry::HostClouds;
 use srrf_model::weights::WeightsError;
 use srrf_model::{NetworkConfig, PairBatch};
 
@@ -52,6 +53,13 @@ pub trait Trained: NetworkConfig {
     /// What is wrong with a stage for this network, as key and reason.
     fn wrong_stage(stage: &StageConfig) -> Option<(&'static str, &'static str)>;
 
+    /// What the network has to know of a shard's clouds before it computes, found ahead of the step by
+    /// other threads.
+    type Layout: Send;
+
+    /// The layout of a shard: its clouds, sources and then targets.
+    fn layout(&self, stage: &StageConfig, clouds: &HostClouds, phase: f32) -> Self::Layout;
+
     /// Gradients and losses of one shard, on a graph of its own.
     fn gradient(
         &self,
@@ -59,6 +67,7 @@ pub trait Trained: NetworkConfig {
         stage: &StageConfig,
         network: &Self::Network,
         shard: Shard,
+        layout: Self::Layout,
     ) -> (GradientsParams, Losses);
 
     /// The poses of a shard, as at inference.
@@ -87,10 +96,15 @@ impl Terms {
 
     /// The gradient of the sum for the parameters of `network`, and the values.
     pub fn finish<M: Module>(self, network: &M) -> (GradientsParams, Losses) {
-        let mut losses: Losses =
-            self.values.into_iter().map(|(name, value)| (name, value.into_scalar::<f64>())).collect();
-        let Some(total) = self.total else { return (GradientsParams::new(), losses) };
-        losses.insert("total", total.clone().detach().into_scalar::<f64>());
-        (GradientsParams::from_grads(total.backward(), network), losses)
+        let (mut names, mut values): (Vec<_>, Vec<_>) = self.values.into_iter().unzip();
+        let mut gradients = GradientsParams::new();
+        if let Some(total) = self.total {
+            names.push("total");
+            values.push(total.clone().detach());
+            gradients = GradientsParams::from_grads(total.backward(), network);
+        }
+        // Read last and at once: a device that works ahead would have to stop for each.
+        let values = Tensor::cat(values, 0).try_to_vec_as::<f64>().unwrap_or_default();
+        (gradients, names.into_iter().zip(values).collect())
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -10,9 +11,10 @@ use burn::optim::ModuleOptimizer;
 use burn::tensor::Device;
 use srrf_cloud::source::ShapeSource;
 use srrf_corrupt::{Pair, Severity};
-use srrf_model::init;
 use srrf_model::weights::{parameters, to_safetensors, with_parameters, write_atomically};
+use srrf_model::{init, is_accelerator};
 
+use crate::ahead::{Ahead, Closing};
 use crate::checkpoint::{self, CheckpointError, Progress};
 use crate::config::{DataSource, TrainConfig};
 use crate::data::TrainingPairs;
@@ -21,8 +23,8 @@ use crate::network::Trained;
 use crate::optimizer::optimizer;
 use crate::resources::cpu_seconds;
 use crate::schedule::Plan;
-use crate::step::{Losses, StepContext, StepError, Workers, gradient, scale};
-use crate::validate::{ValidateError, Validation, validate};
+use crate::step::{AheadOf, Losses, StepContext, StepError, Workers, gradient, prepare, scale};
+use crate::validate::{CHUNK, ValidateError, Validation, validate};
 
 /// Steps between two lines of the log.
 const LOG_EVERY: usize = 10;
@@ -132,7 +134,7 @@ struct Run<'a, C: Trained> {
     config: &'a TrainConfig<C>,
     options: &'a RunOptions,
     device: Device,
-    pairs: TrainingPairs,
+    pairs: Arc<TrainingPairs>,
     held_out: Vec<Pair>,
     workers: Workers,
     plan: Plan,
@@ -154,51 +156,82 @@ pub fn run<C: Trained>(
     device: Device,
     stop: &AtomicBool,
 ) -> Result<Ended, RunError> {
-    let mut run = Run::open(config, options, shapes, device)?;
-    let end = options.until_step.unwrap_or(usize::MAX).min(run.plan.steps());
-    let bar = progress_bar(run.plan.steps(), run.progress.step);
-    let mut window = (Losses::new(), 0);
-    let mut saved = Instant::now();
-    while run.progress.step < end && !stop.load(Ordering::Relaxed) && !run.out_of_time() {
-        let step = run.progress.step;
-        let stage = &config.stages[run.plan.stage(step)];
-        let rate = run.plan.learning_rate(stage, step);
-        let losses = run.step(step, rate)?;
-        run.progress.step = step + 1;
-
-        let epoch = run.plan.epochs(step + 1);
-        merge(&mut window, losses);
-        if (step + 1).is_multiple_of(LOG_EVERY) {
-            let losses = mean(&mut window);
-            let line = message(&stage.name, epoch, rate, &losses, config.optimizer.batch, &bar);
-            if bar.is_hidden() && (step + 1).is_multiple_of(SAY_EVERY) {
-                (options.say)(&format!("step {} of {}  {line}", step + 1, run.plan.steps()));
-            }
-            bar.set_message(line);
-            run.log.train(step + 1, epoch, &stage.name, rate, &losses).map_err(|e| run.io(e))?;
-        }
-        let last = step + 1 == run.plan.steps();
-        if stage.registration
-            && ((step + 1).is_multiple_of(run.plan.steps_in(config.keep.validate_epochs)) || last)
-        {
-            let result = run.validate()?;
-            let line = summary(step + 1, epoch, &result, C::ROWS);
-            if bar.is_hidden() { (options.say)(&line) } else { bar.println(line) }
-        }
-        bar.set_position(run.progress.step as u64);
-        let epochs = config.keep.checkpoint_epochs;
-        let due = epochs > 0.0 && (step + 1).is_multiple_of(run.plan.steps_in(epochs));
-        if due || last || saved.elapsed().as_secs_f64() > config.keep.checkpoint_minutes * 60.0 {
-            run.save()?;
-            saved = Instant::now();
-        }
+    let run = Run::open(config, options, shapes, device)?;
+    if !on_accelerator(config) {
+        return run.go(stop, None);
     }
-    run.save()?;
-    bar.abandon();
-    let best = options.folder.join("best.safetensors");
-    let complete = run.progress.step == run.plan.steps();
-    let best = best.exists().then_some(best);
-    Ok(Ended { step: run.progress.step, complete, skipped: run.progress.skipped, best })
+    // The device computes elsewhere: all threads make pairs ahead of it.
+    let shards = config.optimizer.batch / config.optimizer.shard;
+    let ahead = Ahead::new(run.progress.step * shards, shards + 2 * options.threads);
+    let (pairs, plan) = (run.pairs.clone(), run.plan.clone());
+    std::thread::scope(|scope| {
+        let _closing = Closing(&ahead);
+        for _ in 0..options.threads {
+            scope.spawn(|| {
+                ahead.work(|number| {
+                    let stage = &config.stages[plan.stage(number / shards)];
+                    prepare(config, stage, &pairs, number)
+                });
+            });
+        }
+        run.go(stop, Some(&ahead))
+    })
+}
+
+/// Whether the network runs on another processor than the one that makes the pairs.
+fn on_accelerator<C: Trained>(config: &TrainConfig<C>) -> bool {
+    config.device.as_deref().is_some_and(is_accelerator)
+}
+
+impl<C: Trained> Run<'_, C> {
+    fn go(mut self, stop: &AtomicBool, ahead: Option<&AheadOf<C>>) -> Result<Ended, RunError> {
+        let run = &mut self;
+        let (config, options) = (run.config, run.options);
+        let end = options.until_step.unwrap_or(usize::MAX).min(run.plan.steps());
+        let bar = progress_bar(run.plan.steps(), run.progress.step);
+        let mut window = (Losses::new(), 0);
+        let mut saved = Instant::now();
+        while run.progress.step < end && !stop.load(Ordering::Relaxed) && !run.out_of_time() {
+            let step = run.progress.step;
+            let stage = &config.stages[run.plan.stage(step)];
+            let rate = run.plan.learning_rate(stage, step);
+            let losses = run.step(step, rate, ahead)?;
+            run.progress.step = step + 1;
+
+            let epoch = run.plan.epochs(step + 1);
+            merge(&mut window, losses);
+            if (step + 1).is_multiple_of(LOG_EVERY) {
+                let losses = mean(&mut window);
+                let line = message(&stage.name, epoch, rate, &losses, config.optimizer.batch, &bar);
+                if bar.is_hidden() && (step + 1).is_multiple_of(SAY_EVERY) {
+                    (options.say)(&format!("step {} of {}  {line}", step + 1, run.plan.steps()));
+                }
+                bar.set_message(line);
+                run.log.train(step + 1, epoch, &stage.name, rate, &losses).map_err(|e| run.io(e))?;
+            }
+            let last = step + 1 == run.plan.steps();
+            if stage.registration
+                && ((step + 1).is_multiple_of(run.plan.steps_in(config.keep.validate_epochs)) || last)
+            {
+                let result = run.validate()?;
+                let line = summary(step + 1, epoch, &result, C::ROWS);
+                if bar.is_hidden() { (options.say)(&line) } else { bar.println(line) }
+            }
+            bar.set_position(run.progress.step as u64);
+            let epochs = config.keep.checkpoint_epochs;
+            let due = epochs > 0.0 && (step + 1).is_multiple_of(run.plan.steps_in(epochs));
+            if due || last || saved.elapsed().as_secs_f64() > config.keep.checkpoint_minutes * 60.0 {
+                run.save()?;
+                saved = Instant::now();
+            }
+        }
+        run.save()?;
+        bar.abandon();
+        let best = options.folder.join("best.safetensors");
+        let complete = run.progress.step == run.plan.steps();
+        let best = best.exists().then_some(best);
+        Ok(Ended { step: run.progress.step, complete, skipped: run.progress.skipped, best })
+    }
 }
 
 impl<'a, C: Trained> Run<'a, C> {
@@ -234,12 +267,16 @@ impl<'a, C: Trained> Run<'a, C> {
         let text = toml::to_string(config).map_err(|e| io(&path, std::io::Error::other(e)))?;
         write_atomically(&path, text.as_bytes())?;
 
-        let pairs = TrainingPairs::new(config, shapes).map_err(StepError::from)?;
+        let pairs = Arc::new(TrainingPairs::new(config, shapes).map_err(StepError::from)?);
         let severity = Severity::try_from(config.keep.validate_severity).unwrap_or(Severity::ALL[2]);
         let held_out = pairs.validation(severity).map_err(StepError::from)?;
         let plan = Plan::new(config, pairs.epoch_length());
         let log = Log::open(folder, progress.step).map_err(|e| io(folder, e))?;
-        let workers = Workers::new(options.threads)?;
+        let shards = config.optimizer.batch / config.optimizer.shard;
+        let workers = match on_accelerator(config) {
+            true => Workers::wide(shards.min(options.threads), options.threads)?,
+            false => Workers::new(options.threads)?,
+        };
         let started = (Instant::now(), progress.wall_seconds, cpu_seconds(), progress.cpu_seconds);
         Ok(Self {
             config,
@@ -262,10 +299,10 @@ impl<'a, C: Trained> Run<'a, C> {
     }
 
     /// One step: gradient, check, clip, update.
-    fn step(&mut self, step: usize, rate: f64) -> Result<Losses, RunError> {
+    fn step(&mut self, step: usize, rate: f64, ahead: Option<&AheadOf<C>>) -> Result<Losses, RunError> {
         let config = self.config;
         let stage = &config.stages[self.plan.stage(step)];
-        let context = StepContext { config, stage, pairs: &self.pairs, device: &self.device };
+        let context = StepContext { config, stage, pairs: &self.pairs, device: &self.device, ahead };
         let mut outcome = gradient(&context, &self.model, step, &self.workers)?;
         if !outcome.norm.is_finite() {
             self.progress.skipped += 1;
@@ -288,7 +325,9 @@ impl<'a, C: Trained> Run<'a, C> {
 
     fn validate(&mut self) -> Result<Validation, RunError> {
         let network = &self.config.network;
-        let result = validate(network, &self.model, &self.held_out, &self.device, &self.workers)?;
+        // A GPU takes a whole shard at a time, in the shapes of training.
+        let chunk = if on_accelerator(self.config) { self.config.optimizer.shard } else { CHUNK };
+        let result = validate(network, &self.model, &self.held_out, chunk, &self.device, &self.workers)?;
         let step = self.progress.step;
         self.log.validation(step, self.plan.epochs(step), &result).map_err(|e| self.io(e))?;
         let value = C::ROWS.last().map_or(f64::NAN, |row| result.scores[row].rmse_r);

@@ -4,10 +4,11 @@ use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};
 use srrf_cloud::Rigid;
+use srrf_model::geometry::HostClouds;
 use srrf_model::weights::WeightsError;
 use srrf_model::{
-    BranchOutput, Skeleton, Srrf, SrrfConfig, chamfer, correspondence_loss, embedded, registration_loss,
-    skeleton_loss, spread, transform,
+    BranchOutput, SemLayout, Skeleton, Srrf, SrrfConfig, SrrfLayout, chamfer, correspondence_loss, embedded,
+    registration_loss, skeleton_loss, spread, transform,
 };
 
 use crate::config::{LossConfig, SemTraining, StageConfig};
@@ -30,12 +31,22 @@ impl Trained for SrrfConfig {
             .then_some(("registration", "must be true where sem is frozen, or the stage trains nothing"))
     }
 
+    type Layout = Layout;
+
+    fn layout(&self, stage: &StageConfig, clouds: &HostClouds, phase: f32) -> Layout {
+        match stage.registration {
+            true => Layout::Whole(SrrfConfig::layout(self, clouds, phase)),
+            false => Layout::Skeletons(self.sem.layout(clouds)),
+        }
+    }
+
     fn gradient(
         &self,
         losses: &LossConfig,
         stage: &StageConfig,
         network: &Srrf,
         shard: Shard,
+        layout: Layout,
     ) -> (GradientsParams, Losses) {
         // Only what the stage trains is on the graph.
         let trains_sem = stage.sem != SemTraining::Frozen;
@@ -44,23 +55,30 @@ impl Trained for SrrfConfig {
         fork.dense = if stage.registration { fork.dense.train() } else { fork.dense.valid() };
         fork.skeleton = if stage.registration { fork.skeleton.train() } else { fork.skeleton.valid() };
 
-        let Shard { batch, rotation, translation, phase } = shard;
+        let Shard { batch, rotation, translation, .. } = shard;
         let (source, target) = (batch.source, batch.target);
         let mut terms = Terms::default();
-        let (source_skeleton, target_skeleton) = if stage.registration {
-            let output = fork.forward(&self.integration, source.clone(), target.clone(), phase);
-            for (names, branch) in [(DENSE, &output.dense), (SKELETON, &output.skeleton)] {
-                branch_terms(&mut terms, names, branch, losses.correspondence, &rotation, &translation);
+        let (source_skeleton, target_skeleton) = match layout {
+            Layout::Whole(layout) => {
+                let (skeletons, skeleton, dense) = fork.branches(source.clone(), target.clone(), &layout);
+                for (names, branch) in [(DENSE, &dense), (SKELETON, &skeleton)] {
+                    branch_terms(&mut terms, names, branch, losses.correspondence, &rotation, &translation);
+                }
+                if losses.fused > 0.0 {
+                    let fused = self.integration.fuse(dense.pose(), skeleton.pose(), &source, &target);
+                    let (r, t) = (rotation.clone(), translation.clone());
+                    terms.add(
+                        "fused",
+                        registration_loss(fused.rotation, fused.translation, r, t),
+                        losses.fused,
+                    );
+                }
+                skeletons
             }
-            let fused = (output.fused.rotation, output.fused.translation);
-            terms.add(
-                "fused",
-                registration_loss(fused.0, fused.1, rotation.clone(), translation.clone()),
-                1.0,
-            );
-            (output.source_skeleton, output.target_skeleton)
-        } else {
-            (fork.sem.forward(source.clone()), fork.sem.forward(target.clone()))
+            Layout::Skeletons(layout) => {
+                let clouds = Tensor::cat(vec![source.clone(), target.clone()], 0);
+                fork.sem.forward_with(clouds, &layout).halves()
+            }
         };
         if trains_sem {
             let (x, y) = ((source, &source_skeleton), (target, &target_skeleton));
@@ -87,6 +105,15 @@ impl Trained for SrrfConfig {
         ];
         Found { poses, notes }
     }
+}
+
+/// What a stage has to know of the clouds.
+#[derive(Debug)]
+pub enum Layout {
+    /// Stages that train the registration.
+    Whole(SrrfLayout),
+    /// Stages that train the skeleton module alone.
+    Skeletons(SemLayout),
 }
 
 const DENSE: [&str; 2] = ["dense", "dense_correspondence"];

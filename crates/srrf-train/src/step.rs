@@ -12,8 +12,9 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::Pair;
-use srrf_model::{PairBatch, SrrfConfig};
+use srrf_model::{HostPairs, SrrfConfig};
 
+use crate::ahead::Ahead;
 use crate::config::{OptimizerConfig, StageConfig, TrainConfig};
 use crate::data::TrainingPairs;
 use crate::network::{Shard, Trained};
@@ -31,6 +32,38 @@ pub struct StepContext<'a, C: Trained = SrrfConfig> {
     pub pairs: &'a TrainingPairs,
     /// Device of the network, without autodiff.
     pub device: &'a Device,
+    /// Shards by number, where other threads make them; each worker makes its own otherwise.
+    pub ahead: Option<&'a AheadOf<C>>,
+}
+
+/// Shards made ahead of their steps.
+pub type AheadOf<C> = Ahead<Result<Prepared<<C as Trained>::Layout>, StepError>>;
+
+/// A shard that is not on a device yet.
+pub struct Prepared<L> {
+    pairs: HostPairs,
+    poses: Vec<Rigid>,
+    phase: f32,
+    layout: L,
+}
+
+/// Makes shard number `number` of a run: pairs, frames, layout.
+///
+/// # Errors
+/// [`StepError`] when a pair cannot be made.
+pub fn prepare<C: Trained>(
+    config: &TrainConfig<C>,
+    stage: &StageConfig,
+    pairs: &TrainingPairs,
+    number: usize,
+) -> Result<Prepared<C::Layout>, StepError> {
+    let count = config.optimizer.shard;
+    let first = number * count;
+    let pairs = pairs.shard(first, count)?;
+    let phase = ChaCha8Rng::seed_from_u64(first as u64).random::<f32>();
+    let (pairs, poses) = host_pairs(&pairs).ok_or(StepError::Ragged(first))?;
+    let layout = config.network.layout(stage, &pairs.clouds, phase);
+    Ok(Prepared { pairs, poses, phase, layout })
 }
 
 /// What a step found.
@@ -57,8 +90,8 @@ pub enum StepError {
     Worker,
 }
 
-/// A pool of single-threaded rayon pools: shards run side by side, and nothing inside a shard is
-/// split, so that results do not depend on the number of threads.
+/// A pool of rayon pools: shards run side by side. On the CPU each pool has one thread: nothing inside a
+/// shard is split, so that results do not depend on the number of threads.
 pub struct Workers(Vec<rayon::ThreadPool>);
 
 impl Workers {
@@ -67,8 +100,17 @@ impl Workers {
     /// # Errors
     /// When the system gives no thread.
     pub fn new(threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let pool = |_| rayon::ThreadPoolBuilder::new().num_threads(1).build();
-        (0..threads.max(1)).map(pool).collect::<Result<_, _>>().map(Self)
+        Self::wide(threads, 1)
+    }
+
+    /// `workers` workers, each of which may split what the host does for its shard among `threads`
+    /// threads.
+    ///
+    /// # Errors
+    /// When the system gives no thread.
+    pub fn wide(workers: usize, threads: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
+        let pool = |_| rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build();
+        (0..workers.max(1)).map(pool).collect::<Result<_, _>>().map(Self)
     }
 
     /// `job(0) .. job(count - 1)`, in order.
@@ -107,13 +149,13 @@ pub fn gradient<C: Trained>(
 ) -> Result<StepOutcome, StepError> {
     let OptimizerConfig { batch, shard: size, .. } = context.config.optimizer;
     let shards = batch / size;
-    let run = |i: usize| shard(context, model, step * batch + i * size);
+    let run = |i: usize| shard(context, model, step * shards + i);
     let parts = workers.map(shards, run).ok_or(StepError::Worker)?;
 
     let mut sum = SumVisitor {
         parts: Vec::new(),
         sum: GradientsParams::new(),
-        squares: 0.0,
+        squares: Vec::new(),
         scale: 1.0 / shards as f64,
     };
     let mut losses = Losses::new();
@@ -125,14 +167,19 @@ pub fn gradient<C: Trained>(
         }
     }
     model.visit(&mut sum);
-    Ok(StepOutcome { gradients: sum.sum, norm: sum.squares.sqrt(), losses })
+    // Read at once: a device that works ahead would have to stop for each.
+    let squares = match sum.squares.is_empty() {
+        true => Vec::new(),
+        false => Tensor::cat(sum.squares, 0).try_to_vec_as::<f64>().unwrap_or_else(|_| vec![f64::NAN]),
+    };
+    Ok(StepOutcome { gradients: sum.sum, norm: squares.iter().sum::<f64>().sqrt(), losses })
 }
 
 /// Sums the shards' gradients, in order, into their mean, and its norm.
 struct SumVisitor {
     parts: Vec<GradientsParams>,
     sum: GradientsParams,
-    squares: f64,
+    squares: Vec<Tensor<1>>,
     scale: f64,
 }
 
@@ -141,7 +188,7 @@ impl ModuleVisitor for SumVisitor {
         let grads = self.parts.iter_mut().filter_map(|part| part.remove::<D>(param.id));
         if let Some(total) = grads.reduce(|a, b| a + b) {
             let mean = total * self.scale;
-            self.squares += mean.clone().square().sum().into_scalar::<f64>();
+            self.squares.push(mean.clone().square().sum());
             self.sum.register(param.id, mean);
         }
     }
@@ -162,21 +209,34 @@ pub fn scale<M: Module>(model: &M, gradients: &mut GradientsParams, factor: f64)
 
 /// `pairs` as a shard on `device`.
 pub fn to_shard(pairs: &[Pair], phase: f32, device: &Device) -> Option<Shard> {
+    let (pairs, poses) = host_pairs(pairs)?;
+    Some(upload(&pairs, &poses, phase, device))
+}
+
+/// Pairs in network units, and their true poses between the clouds as they were given.
+fn host_pairs(pairs: &[Pair]) -> Option<(HostPairs, Vec<Rigid>)> {
     let clouds: Vec<(&PointCloud, &PointCloud)> = pairs.iter().map(|p| (&p.source, &p.target)).collect();
-    let poses: Vec<Rigid> = pairs.iter().map(|p| p.target_from_source).collect();
-    let batch = PairBatch::new(&clouds, device)?;
-    let (rotation, translation) = batch.truth(&poses);
-    Some(Shard { batch, rotation, translation, phase })
+    Some((HostPairs::new(&clouds)?, pairs.iter().map(|p| p.target_from_source).collect()))
+}
+
+fn upload(pairs: &HostPairs, poses: &[Rigid], phase: f32, device: &Device) -> Shard {
+    let batch = pairs.upload(device);
+    let (rotation, translation) = batch.truth(poses);
+    Shard { batch, rotation, translation, phase }
 }
 
 /// Gradient and losses of one shard.
 fn shard<C: Trained>(
     context: &StepContext<C>,
     network: &C::Network,
-    first: usize,
+    number: usize,
 ) -> Result<(GradientsParams, Losses), StepError> {
-    let pairs = context.pairs.shard(first, context.config.optimizer.shard)?;
-    let phase = ChaCha8Rng::seed_from_u64(first as u64).random::<f32>();
-    let shard = to_shard(&pairs, phase, context.device).ok_or(StepError::Ragged(first))?;
-    Ok(context.config.network.gradient(&context.config.losses, context.stage, network, shard))
+    let StepContext { config, stage, pairs, device, ahead } = *context;
+    let prepared = match ahead {
+        Some(ahead) => ahead.take(number).ok_or(StepError::Worker)?,
+        None => prepare(config, stage, pairs, number),
+    };
+    let Prepared { pairs, poses, phase, layout } = prepared?;
+    let shard = upload(&pairs, &poses, phase, device);
+    Ok(config.network.gradient(&config.losses, stage, network, shard, layout))
 }

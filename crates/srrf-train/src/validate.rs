@@ -8,8 +8,8 @@ use srrf_eval::{MetricError, PairError, Scores};
 use crate::network::Trained;
 use crate::step::{Workers, to_shard};
 
-/// Pairs that go through the network together.
-const CHUNK: usize = 4;
+/// Pairs that go through the network together on the CPU.
+pub const CHUNK: usize = 4;
 
 /// Results.
 #[derive(Debug, Clone)]
@@ -31,7 +31,7 @@ pub enum ValidateError {
     Failed,
 }
 
-/// Scores `model` on `pairs`.
+/// Scores `model` on `pairs`, `chunk` of them at a time.
 ///
 /// # Errors
 /// [`ValidateError`] when nothing can be scored.
@@ -39,10 +39,11 @@ pub fn validate<C: Trained>(
     config: &C,
     model: &C::Network,
     pairs: &[Pair],
+    chunk: usize,
     device: &burn::tensor::Device,
     workers: &Workers,
 ) -> Result<Validation, ValidateError> {
-    let chunks: Vec<&[Pair]> = pairs.chunks(CHUNK).collect();
+    let chunks: Vec<&[Pair]> = pairs.chunks(chunk.max(1)).collect();
     let run = |i: usize| Some(config.found(model, to_shard(chunks[i], 0.5, device)?));
     let results = workers.map(chunks.len(), run).ok_or(ValidateError::Failed)?;
 

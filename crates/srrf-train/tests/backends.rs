@@ -135,7 +135,7 @@ fn train(device: &Device) -> (Vec<f64>, Vec<f64>) {
     let config = config();
     let (pairs, workers) = (pairs(&config), Workers::new(2).unwrap());
     let stage = config.stages.iter().find(|stage| stage.registration).unwrap();
-    let context = StepContext { config: &config, stage, pairs: &pairs, device };
+    let context = StepContext { config: &config, stage, pairs: &pairs, device, ahead: None };
     let mut optimizer = optimizer(&config.optimizer);
     let mut model = network(&config, device).valid();
     let start = flat(&model);
@@ -249,4 +249,10 @@ fn vulkan_agrees() {
 #[test]
 fn cuda_agrees() {
     suite("cuda");
+}
+
+#[cfg(feature = "libtorch")]
+#[test]
+fn libtorch_agrees() {
+    suite("libtorch");
 }

@@ -82,5 +82,5 @@ impl GraphLayer {
 pub(super) fn neighbours(points: &Tensor<3>, k: usize) -> Vec<i64> {
     let [_, n, _] = points.dims();
     let host = HostClouds::read(points);
-    flat_indices(host.iter(), n, |_, cloud| k_nearest(cloud, cloud, k))
+    flat_indices(&host, n, |_, cloud| k_nearest(cloud, cloud, k))
 }

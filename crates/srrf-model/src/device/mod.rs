@@ -1,7 +1,7 @@
 //! Devices by name. Which ones a program has is settled when it is built, by the cargo features
-//! `ndarray`, `wgpu`, `vulkan` and `cuda`; which of them runs the network, by `--device`.
+//! `ndarray`, `wgpu`, `vulkan`, `cuda` and `libtorch`; which of them runs the network, by `--device`.
 
-#[cfg(any(feature = "wgpu", feature = "cuda"))]
+#[cfg(any(feature = "wgpu", feature = "cuda", feature = "libtorch"))]
 mod accelerator;
 
 use burn::tensor::Device;
@@ -29,12 +29,23 @@ pub enum DeviceError {
 }
 
 /// Names of all devices, built in or not.
-pub const NAMES: [&str; 5] = ["flex", "ndarray", "wgpu", "vulkan", "cuda"];
+pub const NAMES: [&str; 6] = ["flex", "ndarray", "wgpu", "vulkan", "cuda", "libtorch"];
+
+/// Whether the device of this name computes on another processor than the host. `libtorch` counts as one,
+/// since it is there for CUDA.
+pub fn is_accelerator(name: &str) -> bool {
+    !["flex", "ndarray"].contains(&name)
+}
 
 /// Names of the devices that this program was built with.
 pub fn built_in() -> Vec<&'static str> {
-    let features =
-        [cfg!(feature = "ndarray"), cfg!(feature = "wgpu"), cfg!(feature = "vulkan"), cfg!(feature = "cuda")];
+    let features = [
+        cfg!(feature = "ndarray"),
+        cfg!(feature = "wgpu"),
+        cfg!(feature = "vulkan"),
+        cfg!(feature = "cuda"),
+        cfg!(feature = "libtorch"),
+    ];
     let built = std::iter::once(true).chain(features); // flex always
     NAMES.into_iter().zip(built).filter_map(|(name, built)| built.then_some(name)).collect()
 }
@@ -53,7 +64,7 @@ pub fn device(name: &str) -> Result<Device, DeviceError> {
         #[cfg(feature = "ndarray")]
         #[allow(deprecated, reason = "Burn deprecates the backend; it stays supported here")]
         "ndarray" => Ok(Device::ndarray()),
-        #[cfg(any(feature = "wgpu", feature = "cuda"))]
+        #[cfg(any(feature = "wgpu", feature = "cuda", feature = "libtorch"))]
         _ if built_in().contains(&name) => {
             accelerator::open(name).map_err(|reason| DeviceError::Unavailable { name, reason })
         }

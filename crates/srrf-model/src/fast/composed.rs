@@ -5,16 +5,37 @@ use burn::tensor::Tensor;
 use burn::tensor::activation::{relu, sigmoid, softmax};
 
 use super::Activation;
-use crate::geometry::rows;
+use crate::geometry::{on_cubecl, rows};
 
 /// `act(x W + b)`; shapes as in [`super::linear`].
 pub fn linear(layer: &Linear, x: Tensor<2>, activation: Activation) -> Tensor<2> {
-    let y = layer.forward(x);
+    let [count, inputs] = x.dims();
+    let parts = match on_cubecl(&x.device().without_autodiff()) {
+        true => even_parts(count),
+        false => 1,
+    };
+    let y = match parts {
+        1 => layer.forward(x),
+        _ => {
+            let y = layer.forward(x.reshape([parts, count / parts, inputs]));
+            let [_, _, outputs] = y.dims();
+            y.reshape([count, outputs])
+        }
+    };
     match activation {
         Activation::None => y,
         Activation::Relu => relu(y),
         Activation::Sigmoid => sigmoid(y),
     }
+}
+
+/// In how many equal parts to take `count` rows, so that the sums over all rows of the backward pass are
+/// made side by side, and then over the parts: CubeCL's kernels give each sum to one unit. A power of 2 near
+/// the root, or 1 where that does not divide the rows.
+fn even_parts(count: usize) -> usize {
+    let most = 1 << count.trailing_zeros().min(10);
+    let root = (count as f64).sqrt().log2().round() as u32;
+    if count < 4096 { 1 } else { most.min(1 << root) }
 }
 
 /// Multi-head attention; shapes as in [`super::attention`].
