@@ -322,12 +322,21 @@ fn morton(x: u32, y: u32, z: u32) -> u32 {
 
 /// The rows `indices` of `table`, shape `[rows, channels]` to `[indices.len(), channels]`.
 pub fn rows(table: Tensor<2>, indices: &[i64]) -> Tensor<2> {
+    let indices = row_numbers(indices, &table);
+    rows_at(table, indices)
+}
+
+/// Row numbers on the device of `table`, for [`rows_at`].
+pub fn row_numbers(indices: &[i64], table: &Tensor<2>) -> Tensor<1, Int> {
     let device = table.device().without_autodiff();
-    let count = indices.len();
-    let indices = Tensor::<1, Int>::from_data(TensorData::new(indices.to_vec(), [count]), &device);
-    if on_cubecl(&device) {
+    Tensor::from_data(TensorData::new(indices.to_vec(), [indices.len()]), &device)
+}
+
+/// The rows `indices` of `table`, shape `[rows, channels]` to `[indices, channels]`.
+pub fn rows_at(table: Tensor<2>, indices: Tensor<1, Int>) -> Tensor<2> {
+    if on_cubecl(&indices.device()) {
         // Its backward pass of `select` adds the rows one after the other; that of `gather` side by side.
-        let [_, channels] = table.dims();
+        let ([_, channels], [count]) = (table.dims(), indices.dims());
         return table.gather(0, indices.unsqueeze_dim::<2>(1).expand([count, channels]));
     }
     table.select(0, indices)

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::attention::EncoderLayer;
 use crate::fast::{Activation, linear};
-use crate::geometry::{HostClouds, rows};
+use crate::geometry::{HostClouds, row_numbers, rows_at};
 use crate::layout::Neighbourhood;
 
 /// Sizes of the structural feature extractor.
@@ -90,19 +90,20 @@ impl Sfe {
         let [clouds, points, _] = cloud.dims();
         let k = self.neighbours;
         let mut table = cloud.reshape([clouds * points, 3]);
-        let mut indices = &neighbours.in_cloud;
+        let in_tokens = row_numbers(&neighbours.in_tokens, &table);
+        let mut indices = row_numbers(&neighbours.in_cloud, &table);
         let mut outputs = Vec::with_capacity(self.layers.len());
         for layer in &self.layers {
             let [_, channels] = table.dims();
             // T'_n = Concat(T^1 .. T^k) over the neighbours.
-            let joined = rows(table, indices).reshape([clouds * n, k * channels]);
+            let joined = rows_at(table, indices).reshape([clouds * n, k * channels]);
             let joined = linear(&layer.join, joined, Activation::None); // [clouds * n, width]
             let [_, width] = joined.dims();
             // That = LN(MSA(T') + T'), T_{n+1} = LN(MLP(That) + That).
             let features = layer.encoder.forward(joined.reshape([clouds, n, width]));
             outputs.push(features.clone());
             table = features.reshape([clouds * n, width]);
-            indices = &neighbours.in_tokens;
+            indices = in_tokens.clone();
         }
         // F = LN(ReLU(Concat(F_2 .. F_{N_l + 1}))).
         self.norm.forward(relu(Tensor::cat(outputs, 2)))

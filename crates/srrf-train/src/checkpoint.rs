@@ -15,6 +15,8 @@ use srrf_model::weights::{WeightsError, parameters, with_parameters, write_atomi
 use crate::config::TrainConfig;
 use crate::network::Trained;
 
+/// How the optimiser's state is laid out: by rows of parts (`crate::rows`).
+const FORMAT: &str = "rows-1";
 /// Name of the checkpoint in the run's folder.
 pub const FILE: &str = "checkpoint.safetensors";
 
@@ -103,6 +105,7 @@ pub fn save<C: Trained>(
     let header = HashMap::from([
         ("progress".to_string(), json(serde_json::to_string(progress))?),
         ("config".to_string(), json(serde_json::to_string(config))?),
+        ("format".to_string(), FORMAT.to_string()),
     ]);
     let bytes = safetensors::serialize(views, Some(header)).map_err(|e| broken(e.to_string()))?;
     write_atomically(&path, &bytes)?;
@@ -129,6 +132,9 @@ pub fn load<C: Trained>(
     let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| broken(e.to_string()))?;
     let header = header.metadata().clone().unwrap_or_default();
     let entry = |key: &str| header.get(key).ok_or_else(|| broken(format!("no `{key}` in its header")));
+    if header.get("format").is_none_or(|format| format != FORMAT) {
+        return Err(broken("written by another version of this program".into()));
+    }
     let progress: Progress = serde_json::from_str(entry("progress")?).map_err(|e| broken(e.to_string()))?;
     let mut saved: serde_json::Value =
         serde_json::from_str(entry("config")?).map_err(|e| broken(e.to_string()))?;

@@ -10,6 +10,7 @@ pub mod log;
 pub mod network;
 pub mod optimizer;
 pub mod resources;
+pub mod rows;
 pub mod run;
 pub mod schedule;
 mod srrf;

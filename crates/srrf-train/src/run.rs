@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use burn::module::Module;
-use burn::optim::ModuleOptimizer;
 use burn::tensor::Device;
 use srrf_cloud::source::ShapeSource;
 use srrf_corrupt::{Pair, Severity};
@@ -22,8 +21,9 @@ use crate::log::{Log, progress_bar, summary};
 use crate::network::Trained;
 use crate::optimizer::optimizer;
 use crate::resources::cpu_seconds;
+use crate::rows::Updater;
 use crate::schedule::Plan;
-use crate::step::{AheadOf, Losses, StepContext, StepError, Workers, gradient, prepare, scale};
+use crate::step::{AheadOf, Losses, StepContext, StepError, Workers, gradient, prepare};
 use crate::validate::{CHUNK, ValidateError, Validation, validate};
 
 /// Steps between two lines of the log.
@@ -139,7 +139,7 @@ struct Run<'a, C: Trained> {
     workers: Workers,
     plan: Plan,
     model: C::Network,
-    optimizer: ModuleOptimizer,
+    updater: Updater,
     progress: Progress,
     log: Log,
     started: (Instant, f64, f64, f64),
@@ -263,6 +263,7 @@ impl<'a, C: Trained> Run<'a, C> {
                 (model.valid(), optimizer(&config.optimizer), Progress::default())
             }
         };
+        let updater = Updater::new(optimizer, &model);
         let path = folder.join("config.toml");
         let text = toml::to_string(config).map_err(|e| io(&path, std::io::Error::other(e)))?;
         write_atomically(&path, text.as_bytes())?;
@@ -287,7 +288,7 @@ impl<'a, C: Trained> Run<'a, C> {
             workers,
             plan,
             model,
-            optimizer,
+            updater,
             progress,
             log,
             started,
@@ -315,10 +316,9 @@ impl<'a, C: Trained> Run<'a, C> {
         self.progress.skipped_in_a_row = 0;
         let clip = config.optimizer.clip_norm;
         if clip > 0.0 && outcome.norm > clip {
-            scale(&self.model, &mut outcome.gradients, clip / outcome.norm);
+            outcome.gradients.scale(clip / outcome.norm);
         }
-        // The optimiser takes a module on the autodiff device; between steps it lives without.
-        self.model = self.optimizer.step(rate, self.model.clone().train(), outcome.gradients).valid();
+        self.model = self.updater.step(rate, self.model.clone(), outcome.gradients);
         outcome.losses.insert("gradient_norm", outcome.norm);
         Ok(outcome.losses)
     }
@@ -343,7 +343,13 @@ impl<'a, C: Trained> Run<'a, C> {
         let (start, wall, cpu_start, cpu) = self.started;
         self.progress.wall_seconds = wall + start.elapsed().as_secs_f64();
         self.progress.cpu_seconds = cpu + cpu_seconds() - cpu_start;
-        checkpoint::save(&self.options.folder, self.config, &self.model, &self.optimizer, &self.progress)?;
+        checkpoint::save(
+            &self.options.folder,
+            self.config,
+            &self.model,
+            self.updater.optimizer(),
+            &self.progress,
+        )?;
         self.export("last.safetensors", None)?;
         self.log.draw(C::ROWS, C::CURVES).map_err(|e| self.io(std::io::Error::other(e)))
     }

@@ -5,9 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use burn::module::{Module, ModuleVisitor, Param};
-use burn::optim::GradientsParams;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Device;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use srrf_cloud::{PointCloud, Rigid};
@@ -18,6 +16,7 @@ use crate::ahead::Ahead;
 use crate::config::{OptimizerConfig, StageConfig, TrainConfig};
 use crate::data::TrainingPairs;
 use crate::network::{Shard, Trained};
+use crate::rows::RowGradients;
 
 /// Named means over the pairs of a batch.
 pub type Losses = BTreeMap<&'static str, f64>;
@@ -68,8 +67,8 @@ pub fn prepare<C: Trained>(
 
 /// What a step found.
 pub struct StepOutcome {
-    /// The summed gradient.
-    pub gradients: GradientsParams,
+    /// The mean gradient.
+    pub gradients: RowGradients,
     /// Its norm before clipping; not finite if anything went wrong.
     pub norm: f64,
     /// The losses.
@@ -152,59 +151,18 @@ pub fn gradient<C: Trained>(
     let run = |i: usize| shard(context, model, step * shards + i);
     let parts = workers.map(shards, run).ok_or(StepError::Worker)?;
 
-    let mut sum = SumVisitor {
-        parts: Vec::new(),
-        sum: GradientsParams::new(),
-        squares: Vec::new(),
-        scale: 1.0 / shards as f64,
-    };
+    let mut rows = Vec::with_capacity(shards);
     let mut losses = Losses::new();
     for part in parts {
         let (gradients, part_losses) = part?;
-        sum.parts.push(gradients);
+        rows.push(gradients);
         for (name, value) in part_losses {
             *losses.entry(name).or_insert(0.0) += value / shards as f64;
         }
     }
-    model.visit(&mut sum);
-    // Read at once: a device that works ahead would have to stop for each.
-    let squares = match sum.squares.is_empty() {
-        true => Vec::new(),
-        false => Tensor::cat(sum.squares, 0).try_to_vec_as::<f64>().unwrap_or_else(|_| vec![f64::NAN]),
-    };
-    Ok(StepOutcome { gradients: sum.sum, norm: squares.iter().sum::<f64>().sqrt(), losses })
-}
-
-/// Sums the shards' gradients, in order, into their mean, and its norm.
-struct SumVisitor {
-    parts: Vec<GradientsParams>,
-    sum: GradientsParams,
-    squares: Vec<Tensor<1>>,
-    scale: f64,
-}
-
-impl ModuleVisitor for SumVisitor {
-    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let grads = self.parts.iter_mut().filter_map(|part| part.remove::<D>(param.id));
-        if let Some(total) = grads.reduce(|a, b| a + b) {
-            let mean = total * self.scale;
-            self.squares.push(mean.clone().square().sum());
-            self.sum.register(param.id, mean);
-        }
-    }
-}
-
-/// Scales every gradient of `model` in `gradients`.
-pub fn scale<M: Module>(model: &M, gradients: &mut GradientsParams, factor: f64) {
-    struct Scale<'a>(&'a mut GradientsParams, f64);
-    impl ModuleVisitor for Scale<'_> {
-        fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-            if let Some(gradient) = self.0.remove::<D>(param.id) {
-                self.0.register(param.id, gradient * self.1);
-            }
-        }
-    }
-    model.visit(&mut Scale(gradients, factor));
+    let gradients = RowGradients::mean(rows);
+    let norm = gradients.norm();
+    Ok(StepOutcome { gradients, norm, losses })
 }
 
 /// `pairs` as a shard on `device`.
@@ -230,7 +188,7 @@ fn shard<C: Trained>(
     context: &StepContext<C>,
     network: &C::Network,
     number: usize,
-) -> Result<(GradientsParams, Losses), StepError> {
+) -> Result<(RowGradients, Losses), StepError> {
     let StepContext { config, stage, pairs, device, ahead } = *context;
     let prepared = match ahead {
         Some(ahead) => ahead.take(number).ok_or(StepError::Worker)?,
@@ -238,5 +196,6 @@ fn shard<C: Trained>(
     };
     let Prepared { pairs, poses, phase, layout } = prepared?;
     let shard = upload(&pairs, &poses, phase, device);
-    Ok(config.network.gradient(&config.losses, stage, network, shard, layout))
+    let (gradients, losses) = config.network.gradient(&config.losses, stage, network, shard, layout);
+    Ok((RowGradients::new(gradients, network), losses))
 }

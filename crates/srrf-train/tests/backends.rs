@@ -25,6 +25,7 @@ use srrf_train::config::TrainConfig;
 use srrf_train::data::TrainingPairs;
 use srrf_train::network::Shard;
 use srrf_train::optimizer::optimizer;
+use srrf_train::rows::Updater;
 use srrf_train::step::{StepContext, Workers, gradient, to_shard};
 
 const FORWARD: f64 = 1e-4;
@@ -136,15 +137,15 @@ fn train(device: &Device) -> (Vec<f64>, Vec<f64>) {
     let (pairs, workers) = (pairs(&config), Workers::new(2).unwrap());
     let stage = config.stages.iter().find(|stage| stage.registration).unwrap();
     let context = StepContext { config: &config, stage, pairs: &pairs, device, ahead: None };
-    let mut optimizer = optimizer(&config.optimizer);
     let mut model = network(&config, device).valid();
+    let mut updater = Updater::new(optimizer(&config.optimizer), &model);
     let start = flat(&model);
     let mut losses = Vec::new();
     for step in 0..STEPS {
         let outcome = gradient(&context, &model, step, &workers).unwrap();
         losses.push(outcome.losses["total"]);
         let rate = context.stage.learning_rate;
-        model = optimizer.step(rate, model.clone().train(), outcome.gradients).valid();
+        model = updater.step(rate, model, outcome.gradients);
     }
     (losses, flat(&model).iter().zip(start).map(|(after, before)| after - before).collect())
 }

@@ -24,7 +24,8 @@ use srrf_model::{PairBatch, Srrf, init, keep_freed_memory};
 use srrf_train::config::{StageConfig, TrainConfig};
 use srrf_train::data::TrainingPairs;
 use srrf_train::optimizer::optimizer;
-use srrf_train::step::{StepContext, Workers, gradient, scale};
+use srrf_train::rows::Updater;
+use srrf_train::step::{StepContext, Workers, gradient};
 
 use crate::clock::{median, memory_mib, summary, timed};
 use crate::clouds::Stored;
@@ -132,21 +133,27 @@ impl Bench {
     /// Whole training steps, as `srrf-train` makes them.
     fn steps(&self, stage: &StageConfig, arguments: &Arguments) -> Result<Map<String, Value>, Failure> {
         let optimizer_config = &self.config.optimizer;
-        let context = StepContext { config: &self.config, stage, pairs: &self.pairs, device: &self.device };
+        let context = StepContext {
+            config: &self.config,
+            stage,
+            pairs: &self.pairs,
+            device: &self.device,
+            ahead: None,
+        };
         let workers = Workers::new(arguments.threads)?;
-        let mut optimizer = optimizer(optimizer_config);
         let mut model = self.model.clone();
+        let mut updater = Updater::new(optimizer(optimizer_config), &model);
         let mut loss = 0.0;
         let mut step = 0;
         let times = timed(arguments, || {
             let mut outcome = gradient(&context, &model, step, &workers)?;
             let clip = optimizer_config.clip_norm;
             if clip > 0.0 && outcome.norm > clip {
-                scale(&model, &mut outcome.gradients, clip / outcome.norm);
+                outcome.gradients.scale(clip / outcome.norm);
             }
             // A hundredth of the rate: the steps are as long, and the weights stay near their start.
             let rate = stage.learning_rate * 0.01;
-            model = optimizer.step(rate, model.clone().train(), outcome.gradients).valid();
+            model = updater.step(rate, model.clone(), outcome.gradients);
             loss = outcome.losses.get("total").copied().unwrap_or(f64::NAN);
             step += 1;
             Ok(())

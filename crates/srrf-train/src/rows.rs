@@ -1,0 +1,235 @@
+//! Parameters and gradients as one row of numbers for each part of a network (its top-level fields), so
+//! that the optimiser makes some dozen operations a part, and not some dozen for each of hundreds of
+//! tensors: on a GPU their launches would cost as much as the network.
+
+use burn::module::{Module, ModuleMapper, ModuleVisitor, Param, ParamId};
+use burn::optim::{GradientsParams, ModuleOptimizer};
+use burn::tensor::Tensor;
+
+/// The gradient of each part; none where nothing in it was trained.
+pub struct RowGradients(Vec<Option<Tensor<1>>>);
+
+impl RowGradients {
+    /// The gradients of `network`, without those of other modules.
+    pub fn new<M: Module>(gradients: GradientsParams, network: &M) -> Self {
+        let mut rows = GradientRows { gradients, path: Path::default(), parts: Vec::new() };
+        network.visit(&mut rows);
+        let whole = |part: Vec<(Option<Tensor<1>>, Zeros)>| {
+            let trained = part.iter().any(|(gradient, _)| gradient.is_some());
+            let filled = part.into_iter().map(|(gradient, zeros)| gradient.unwrap_or_else(|| zeros.tensor()));
+            trained.then(|| Tensor::cat(filled.collect(), 0))
+        };
+        Self(rows.parts.into_iter().map(whole).collect())
+    }
+
+    /// The mean, summed in the order given.
+    pub fn mean(all: Vec<Self>) -> Self {
+        let scale = 1.0 / all.len().max(1) as f64;
+        let sum = all.into_iter().reduce(|a, b| {
+            let both = |(a, b): (Option<Tensor<1>>, Option<Tensor<1>>)| match (a, b) {
+                (Some(a), Some(b)) => Some(a + b),
+                (a, b) => a.or(b),
+            };
+            Self(a.0.into_iter().zip(b.0).map(both).collect())
+        });
+        let mut mean = sum.unwrap_or_else(|| Self(Vec::new()));
+        if scale != 1.0 {
+            mean.scale(scale);
+        }
+        mean
+    }
+
+    /// Euclidean norm over all parts; not finite where any number is not.
+    pub fn norm(&self) -> f64 {
+        let squares: Vec<Tensor<1>> = self.0.iter().flatten().map(|g| g.clone().square().sum()).collect();
+        if squares.is_empty() {
+            return 0.0;
+        }
+        // Read at once: a device that works ahead has to stop for it.
+        let squares = Tensor::cat(squares, 0).try_to_vec_as::<f64>().unwrap_or_else(|_| vec![f64::NAN]);
+        squares.iter().sum::<f64>().sqrt()
+    }
+
+    /// Multiplies every gradient.
+    pub fn scale(&mut self, factor: f64) {
+        for gradient in &mut self.0 {
+            *gradient = gradient.take().map(|g| g * factor);
+        }
+    }
+}
+
+/// Burn's optimiser on the rows of a network.
+pub struct Updater {
+    optimizer: ModuleOptimizer,
+    rows: Rows,
+}
+
+impl Updater {
+    /// The optimiser, new or with the state that [`Updater::optimizer`] had, on the parameters of `network`,
+    /// which must be off the graph.
+    pub fn new<M: Module>(optimizer: ModuleOptimizer, network: &M) -> Self {
+        let mut rows = ParameterRows::default();
+        network.visit(&mut rows);
+        let part = |(i, part): (usize, Vec<Tensor<1>>)| {
+            // Numbered in order, so that the state finds its rows again in another process.
+            Param::initialized(ParamId::from(i as u64 + 1), Tensor::cat(part, 0))
+        };
+        Self { optimizer, rows: Rows { parts: rows.parts.into_iter().enumerate().map(part).collect() } }
+    }
+
+    /// What a checkpoint keeps.
+    pub fn optimizer(&self) -> &ModuleOptimizer {
+        &self.optimizer
+    }
+
+    /// One step of `network`, which must be as the last step left it.
+    pub fn step<M: Module>(&mut self, rate: f64, network: M, gradients: RowGradients) -> M {
+        let mut given = GradientsParams::new();
+        let mut trained = Vec::new();
+        for (part, gradient) in self.rows.parts.iter().zip(gradients.0) {
+            trained.push(gradient.is_some());
+            if let Some(gradient) = gradient {
+                given.register(part.id, gradient);
+            }
+        }
+        // The optimiser takes a module on the autodiff device; between steps it lives without.
+        self.rows = self.optimizer.step(rate, self.rows.clone().train(), given).valid();
+        let parts = self.rows.parts.iter().zip(trained);
+        let parts = parts.map(|(part, trained)| trained.then(|| part.val())).collect();
+        network.map(&mut Spread { parts, path: Path::default(), at: 0 })
+    }
+}
+
+/// The parameters of each part.
+#[derive(Module, Debug)]
+struct Rows {
+    parts: Vec<Param<Tensor<1>>>,
+}
+
+/// Which part a visit is in: a new one begins with each top-level field.
+#[derive(Default)]
+struct Path {
+    depth: usize,
+    field: String,
+    /// Parts begun.
+    begun: usize,
+    /// The field of the part begun last.
+    last: Option<String>,
+}
+
+impl Path {
+    fn enter(&mut self, name: &str) {
+        if self.depth == 0 {
+            self.field = name.to_string();
+        }
+        self.depth += 1;
+    }
+
+    fn exit(&mut self) {
+        self.depth -= 1;
+    }
+
+    /// Number of the part that the next parameter belongs to, and whether it is its first.
+    fn part(&mut self) -> (usize, bool) {
+        let first = self.last.as_ref() != Some(&self.field);
+        if first {
+            self.last = Some(self.field.clone());
+            self.begun += 1;
+        }
+        (self.begun - 1, first)
+    }
+}
+
+/// What stands for a gradient that there is none of.
+struct Zeros(Box<dyn Fn() -> Tensor<1>>);
+
+impl Zeros {
+    fn tensor(&self) -> Tensor<1> {
+        (self.0)()
+    }
+}
+
+struct GradientRows {
+    gradients: GradientsParams,
+    path: Path,
+    parts: Vec<Vec<(Option<Tensor<1>>, Zeros)>>,
+}
+
+impl ModuleVisitor for GradientRows {
+    fn enter_module(&mut self, name: &str, _container_type: &str) {
+        self.path.enter(name);
+    }
+
+    fn exit_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.exit();
+    }
+
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        let (part, first) = self.path.part();
+        if first {
+            self.parts.push(Vec::new());
+        }
+        let value = param.val();
+        let count = value.shape().num_elements();
+        let gradient = self.gradients.remove::<D>(param.id).map(|g| g.reshape([count]));
+        let device = value.device().without_autodiff();
+        let zeros = Zeros(Box::new(move || Tensor::zeros([count], (&device, value.dtype()))));
+        self.parts[part].push((gradient, zeros));
+    }
+}
+
+#[derive(Default)]
+struct ParameterRows {
+    path: Path,
+    parts: Vec<Vec<Tensor<1>>>,
+}
+
+impl ModuleVisitor for ParameterRows {
+    fn enter_module(&mut self, name: &str, _container_type: &str) {
+        self.path.enter(name);
+    }
+
+    fn exit_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.exit();
+    }
+
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        let (part, first) = self.path.part();
+        if first {
+            self.parts.push(Vec::new());
+        }
+        let value = param.val();
+        let count = value.shape().num_elements();
+        self.parts[part].push(value.reshape([count]));
+    }
+}
+
+/// Gives each parameter its share of its part's row; parts that were not trained stay as they are.
+struct Spread {
+    parts: Vec<Option<Tensor<1>>>,
+    path: Path,
+    at: usize,
+}
+
+impl ModuleMapper for Spread {
+    fn enter_module(&mut self, name: &str, _container_type: &str) {
+        self.path.enter(name);
+    }
+
+    fn exit_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.exit();
+    }
+
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let (part, first) = self.path.part();
+        if first {
+            self.at = 0;
+        }
+        let Some(Some(row)) = self.parts.get(part) else { return param };
+        let (id, tensor, mapper) = param.consume();
+        let (dims, count) = (tensor.dims(), tensor.shape().num_elements());
+        let value = row.clone().narrow(0, self.at, count).reshape(dims);
+        self.at += count;
+        Param::from_mapped_value(id, value, mapper)
+    }
+}
