@@ -149,32 +149,31 @@ pub fn k_nearest(queries: &[[f32; 3]], support: &[[f32; 3]], k: usize) -> Vec<u3
     let columns = Columns::new(kept.iter().map(|&i| support[i as usize]));
     let found = k.min(kept.len());
     let mut out = Vec::with_capacity(queries.len() * k);
-    let mut best: Vec<(f32, u32)> = Vec::with_capacity(found + 1);
     let (mut distances, mut least) = columns.buffers();
+    let mut ranked = least.clone();
+    // Distance above, number below: in order as whole numbers, since no distance is negative.
+    let mut near: Vec<u64> = Vec::new();
     for query in queries {
         vectorized(
             #[inline(always)]
             || columns.squared(query, &mut distances, &mut least),
         );
-        best.clear();
-        let mut worst = (f32::INFINITY, u32::MAX);
-        for (i, &least) in least.iter().enumerate() {
-            if least > worst.0 {
-                continue;
-            }
-            for j in Columns::lane(i).take_while(|&j| j < kept.len()) {
-                let candidate = (distances[j], j as u32);
-                if candidate < worst {
-                    let at = best.partition_point(|other| *other < candidate);
-                    best.insert(at, candidate);
-                    if best.len() >= found {
-                        best.truncate(found);
-                        worst = best[found - 1];
-                    }
-                }
+        // Each entry of `least` is the distance of another point, so the k-th smallest bounds the k-th
+        // neighbour.
+        let bound = if found <= least.len() {
+            ranked.copy_from_slice(&least);
+            *ranked.select_nth_unstable_by(found - 1, f32::total_cmp).1
+        } else {
+            f32::INFINITY
+        };
+        near.clear();
+        for (i, _) in least.iter().enumerate().filter(|(_, least)| **least <= bound) {
+            for j in Columns::lane(i).filter(|&j| distances[j] <= bound && j < kept.len()) {
+                near.push(u64::from(distances[j].to_bits()) << 32 | j as u64);
             }
         }
-        out.extend((0..k).map(|j| kept[best[j % found].1 as usize]));
+        near.sort_unstable();
+        out.extend((0..k).map(|j| kept[(near[j % found] & u64::from(u32::MAX)) as usize]));
     }
     out
 }

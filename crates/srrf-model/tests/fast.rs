@@ -31,10 +31,10 @@ fn leaf((values, shape): &Input, dtype: DType, device: &Device) -> Tensor<2> {
 /// Output of `operation` and the gradients of `sum(output * weights)` in every input.
 fn run(
     inputs: &[Input],
-    dtype: DType,
+    (device, dtype): (&Device, DType),
     operation: &dyn Fn(&[Tensor<2>]) -> Tensor<2>,
 ) -> (Vec<f64>, Vec<Vec<f64>>) {
-    let device = Device::flex().autodiff();
+    let device = device.clone().autodiff();
     let leaves: Vec<Tensor<2>> = inputs.iter().map(|input| leaf(input, dtype, &device)).collect();
     let output = operation(&leaves);
     let shape = output.dims();
@@ -59,8 +59,25 @@ fn check(
     fast: &dyn Fn(&[Tensor<2>]) -> Tensor<2>,
     composed: &dyn Fn(&[Tensor<2>]) -> Tensor<2>,
 ) {
-    let (output, gradients) = run(inputs, DType::F32, fast);
-    let (wanted_output, wanted_gradients) = run(inputs, DType::F64, composed);
+    for device in devices() {
+        check_on(&device, inputs, fast, composed);
+    }
+}
+
+/// The devices that have custom operations.
+fn devices() -> Vec<Device> {
+    let more = cfg!(feature = "libtorch").then(|| srrf_model::device("libtorch").unwrap());
+    std::iter::once(Device::flex()).chain(more).collect()
+}
+
+fn check_on(
+    device: &Device,
+    inputs: &[Input],
+    fast: &dyn Fn(&[Tensor<2>]) -> Tensor<2>,
+    composed: &dyn Fn(&[Tensor<2>]) -> Tensor<2>,
+) {
+    let (output, gradients) = run(inputs, (device, DType::F32), fast);
+    let (wanted_output, wanted_gradients) = run(inputs, (&Device::flex(), DType::F64), composed);
     assert_close("output", &output, &wanted_output, EXACT);
     for (i, (ours, wanted)) in gradients.iter().zip(&wanted_gradients).enumerate() {
         assert_close(&format!("gradient of input {i}"), ours, wanted, EXACT);
@@ -68,11 +85,10 @@ fn check(
 
     let weights = Numbers(99).many(output.len());
     let value = |inputs: &[Input]| -> f64 {
-        let device = Device::flex();
         let tensors: Vec<Tensor<2>> = inputs
             .iter()
             .map(|(v, shape)| {
-                Tensor::<2>::from_data(TensorData::new(v.clone(), *shape), (&device, DType::F32))
+                Tensor::<2>::from_data(TensorData::new(v.clone(), *shape), (device, DType::F32))
             })
             .collect();
         values(&fast(&tensors)).iter().zip(&weights).map(|(o, w)| o * w).sum()
@@ -120,7 +136,10 @@ fn linear_layers_with_each_activation() {
     // ReLU has a kink, where differences say nothing: held against the composition only.
     let relu = |t: &[Tensor<2>]| fast::linear(&linear_of(t), t[0].clone(), Activation::Relu);
     let wanted = |t: &[Tensor<2>]| composed::linear(&linear_of(t), t[0].clone(), Activation::Relu);
-    let (ours, wanted) = (run(&inputs, DType::F32, &relu), run(&inputs, DType::F64, &wanted));
+    let (ours, wanted) = (
+        run(&inputs, (&Device::flex(), DType::F32), &relu),
+        run(&inputs, (&Device::flex(), DType::F64), &wanted),
+    );
     assert_close("relu", &ours.0, &wanted.0, EXACT);
     assert!(ours.0.contains(&0.0) && ours.0.iter().any(|&v| v > 0.5));
     for (a, b) in ours.1.iter().zip(&wanted.1) {
@@ -152,7 +171,10 @@ fn group_norm_and_relu() {
     let flat = |t: &Tensor<2>| t.clone().reshape([15]);
     let ours = |t: &[Tensor<2>]| fast::group_norm_relu(t[0].clone(), flat(&t[1]), flat(&t[2]), 3, 5);
     let wanted = |t: &[Tensor<2>]| composed::group_norm_relu(t[0].clone(), flat(&t[1]), flat(&t[2]), 3, 5);
-    let (ours, wanted) = (run(&inputs, DType::F32, &ours), run(&inputs, DType::F64, &wanted));
+    let (ours, wanted) = (
+        run(&inputs, (&Device::flex(), DType::F32), &ours),
+        run(&inputs, (&Device::flex(), DType::F64), &wanted),
+    );
     assert_close("group norm", &ours.0, &wanted.0, EXACT);
     assert!(ours.0.contains(&0.0) && ours.0.iter().any(|&v| v > 0.5));
     for (a, b) in ours.1.iter().zip(&wanted.1) {
@@ -166,14 +188,20 @@ fn gathering_neighbours() {
     let inputs = [input(10, [17, 5]), input(11, [9, 5])];
     let relu = |t: &[Tensor<2>]| fast::gather_relu(t[0].clone(), t[1].clone(), &neighbours);
     let wanted = |t: &[Tensor<2>]| composed::gather_relu(t[0].clone(), t[1].clone(), &neighbours);
-    let (ours, wanted) = (run(&inputs, DType::F32, &relu), run(&inputs, DType::F64, &wanted));
+    let (ours, wanted) = (
+        run(&inputs, (&Device::flex(), DType::F32), &relu),
+        run(&inputs, (&Device::flex(), DType::F64), &wanted),
+    );
     assert_close("gathered", &ours.0, &wanted.0, EXACT);
     for (a, b) in ours.1.iter().zip(&wanted.1) {
         assert_close("gradient of gathering", a, b, EXACT);
     }
     let largest = |t: &[Tensor<2>]| fast::gather_max(t[0].clone(), &neighbours, 4);
     let wanted = |t: &[Tensor<2>]| composed::gather_max(t[0].clone(), &neighbours, 4);
-    let (ours, wanted) = (run(&inputs[..1], DType::F32, &largest), run(&inputs[..1], DType::F64, &wanted));
+    let (ours, wanted) = (
+        run(&inputs[..1], (&Device::flex(), DType::F32), &largest),
+        run(&inputs[..1], (&Device::flex(), DType::F64), &wanted),
+    );
     assert_close("largest", &ours.0, &wanted.0, EXACT);
     assert_close("gradient of the largest", &ours.1[0], &wanted.1[0], EXACT);
 }

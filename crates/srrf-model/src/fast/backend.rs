@@ -8,8 +8,8 @@ use super::group::Neighbours;
 use super::linear::Activation;
 use super::{add_norm, attention, group, group_norm, linear};
 
-/// Operations that the flex backend has on top of Burn's own.
-#[backend_extension(Flex, Autodiff)]
+/// Operations that flex and LibTorch have on top of Burn's own.
+#[backend_extension(Flex, LibTorch: cfg(feature = "libtorch"), Autodiff)]
 pub trait FastOps: Backend {
     /// `act(x W + b)`.
     fn fast_linear(

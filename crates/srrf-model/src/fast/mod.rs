@@ -1,18 +1,22 @@
 //! Custom operations for the blocks where the time goes: a linear layer with its activation,
 //! multi-head attention, the sum of two tensors under a layer norm, group norm, and the gathering of
-//! neighbours. Each is one node of the graph with a hand-written backward pass, on Burn's flex backend in `f32`; every other backend and number
-//! type takes the composition of Burn's own operations in [`composed`].
+//! neighbours. Each is one node of the graph with a hand-written backward pass, on Burn's flex backend and
+//! on LibTorch, in `f32`; every other backend and number type takes the composition of Burn's own operations in [`composed`].
 //!
 //! The two ways are the same mathematics; `tests/fast.rs` holds them against each other and against
 //! finite differences.
 
 mod add_norm;
 mod attention;
+#[cfg_attr(feature = "libtorch", allow(deprecated, reason = "see `device`"))]
 mod backend;
 pub mod composed;
 mod group;
 mod group_norm;
 mod kernels;
+#[cfg(feature = "libtorch")]
+#[allow(deprecated, reason = "see `device`")]
+mod libtorch;
 mod linear;
 
 use burn::backend::Dispatch;
@@ -25,7 +29,17 @@ pub use linear::Activation;
 
 /// Whether the custom operations serve `tensor`.
 fn served<const D: usize>(tensor: &Tensor<D>) -> bool {
-    tensor.dtype() == DType::F32 && tensor.device().without_autodiff() == Device::flex()
+    let device = tensor.device().without_autodiff();
+    tensor.dtype() == DType::F32 && (device == Device::flex() || on_libtorch(&device))
+}
+
+/// Whether the device is one of LibTorch's.
+fn on_libtorch(device: &Device) -> bool {
+    match device.as_dispatch() {
+        #[cfg(feature = "libtorch")]
+        burn::backend::DispatchDevice::LibTorch(_) => true,
+        _ => false,
+    }
 }
 
 /// `act(x W + b)`.
