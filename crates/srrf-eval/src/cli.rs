@@ -54,7 +54,7 @@ pub struct Options {
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
 
-    /// Where the network runs: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda` where built in
+    /// Where the network runs: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda`, `libtorch` where built in
     #[arg(long, value_name = "NAME", default_value = "flex")]
     pub device: String,
 

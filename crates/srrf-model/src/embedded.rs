@@ -10,6 +10,7 @@ use crate::weights::{self, LoadedModel, WeightsError, from_safetensors};
 /// The first is the default.
 const EMBEDDED: &[(&str, &[u8])] = &[
     ("srrf-small", include_bytes!("../weights/srrf-small.safetensors")),
+    ("srrf", include_bytes!("../weights/srrf.safetensors")),
     ("srrf-shapes", include_bytes!("../weights/srrf-shapes.safetensors")),
 ];
 
@@ -18,8 +19,8 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     EMBEDDED.iter().map(|(name, _)| *name)
 }
 
-/// An embedded model by name: `srrf-small` (trained on ModelNet40, the default) or `srrf-shapes` (trained on
-/// the built-in shapes). `None` if there is no model of that name. What `srrf-small` was trained from lies
+/// An embedded model by name: `srrf-small` (trained on ModelNet40, the default), `srrf` (the full-size one,
+/// trained on the same shapes on a GPU) or `srrf-shapes` (trained on the built-in shapes). `None` if there is no model of that name. What `srrf-small` was trained from lies
 /// beside it as files, `srrf-small-start` and `srrf-small-2`.
 pub fn load(name: &str, device: &Device) -> Option<Result<LoadedModel, WeightsError>> {
     let (name, bytes) = EMBEDDED.iter().find(|(known, _)| *known == name)?;
@@ -61,7 +62,7 @@ mod tests {
         for name in names() {
             assert_eq!(load(name, &device).unwrap().unwrap().name, name);
         }
-        assert_eq!(names().count(), 2);
+        assert_eq!(names().count(), 3);
         assert!(load("srrf-large", &device).is_none());
         assert_eq!(open("srrf-shapes", &device).unwrap().name, "srrf-shapes");
         let unknown = open("srrf-large", &device).unwrap_err().to_string();

@@ -19,6 +19,9 @@ pub enum InlierTest {
     /// The same test for both branches: a point of the full source cloud is an inlier when the
     /// branch's pose brings it closer than `tau` to the target cloud.
     Nearest,
+    /// As [`InlierTest::Nearest`], from both sides: the mean of the shares of source points near the target
+    /// and of target points near the source.
+    BothWays,
 }
 
 /// How the two poses are blended.
@@ -124,6 +127,13 @@ impl IntegrationConfig {
                 let target = HostClouds::read(target);
                 let clouds: Vec<_> = moved.iter().zip(target.iter()).collect();
                 clouds.par_iter().map(|(a, b)| share_within(a, b, threshold as f32)).collect()
+            }
+            InlierTest::BothWays => {
+                let moved = HostClouds::read(&transform(source.clone().detach(), rotation, translation));
+                let target = HostClouds::read(target);
+                let clouds: Vec<_> = moved.iter().zip(target.iter()).collect();
+                let share = |a, b| share_within(a, b, threshold as f32);
+                clouds.par_iter().map(|(a, b)| 0.5 * (share(a, b) + share(b, a))).collect()
             }
         }
     }

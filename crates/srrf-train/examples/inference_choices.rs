@@ -35,20 +35,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!(
         "| passes | tokens | inlier test | sharpness | dense | skeleton | fused |\n|---|---|---|---|---|---|---|"
     );
-    let (nearest, soft) = (InlierTest::Nearest, InlierTest::SoftMatch);
-    for (passes, tokens, test, threshold, sharpness) in [
-        (1, 128, nearest, 0.05, 1.0),
-        (1, 256, nearest, 0.05, 1.0),
-        (2, 128, nearest, 0.05, 1.0),
-        (2, 256, nearest, 0.05, 1.0),
-        (2, 256, nearest, 0.03, 1.0),
-        (2, 256, nearest, 0.05, 4.0),
-        (2, 256, nearest, 0.03, 4.0),
-        (2, 256, nearest, 0.05, 16.0),
-        (2, 256, soft, 0.05, 1.0),
-        (2, 256, soft, 0.05, 4.0),
-        (2, 512, nearest, 0.05, 1.0),
-        (3, 256, nearest, 0.05, 1.0),
+    let (nearest, both) = (InlierTest::Nearest, InlierTest::BothWays);
+    for (passes, tokens, test, threshold, skeleton_threshold, sharpness) in [
+        (1, 256, nearest, 0.05, 0.05, 16.0),
+        (2, 256, nearest, 0.05, 0.05, 16.0),
+        (2, 512, both, 0.05, 0.05, 16.0),
+        (2, 512, both, 0.05, 0.047, 16.0),
+        (2, 512, both, 0.05, 0.045, 16.0),
+        (2, 512, both, 0.05, 0.04, 16.0),
+        (2, 512, both, 0.05, 0.045, 32.0),
+        (2, 512, nearest, 0.05, 0.045, 16.0),
     ] {
         let device = device("flex")?;
         let mut loaded = weights::load(Path::new(weights_path), &device)?;
@@ -56,11 +52,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         loaded.config.integration.test = test;
         loaded.config.integration.sharpness = sharpness;
         loaded.config.integration.dense_threshold = threshold;
-        loaded.config.integration.skeleton_threshold = if test == soft { 0.1 } else { threshold };
+        loaded.config.integration.skeleton_threshold = skeleton_threshold;
         let mut method = SrrfRegister::new(loaded, device);
         method.passes = passes;
         let rows = score(&method, &held_out, &workers)?;
-        println!("| {passes} | {tokens} | {test:?} {threshold} | {sharpness} | {} |", rows.join(" | "));
+        println!("| {passes} | {tokens} | {test:?} {threshold} {skeleton_threshold} | {sharpness} | {} |", rows.join(" | "));
     }
     Ok(())
 }

@@ -57,7 +57,7 @@ pub struct TrainConfig<C: Trained = SrrfConfig> {
     /// Their network must have the sizes of this one.
     #[serde(default)]
     pub start: Option<String>,
-    /// Where the network runs (`flex`, `ndarray`, `wgpu`, `vulkan`, `cuda`); `--device` comes before
+    /// Where the network runs (`flex`, `ndarray`, `wgpu`, `vulkan`, `cuda`, `libtorch`); `--device` comes before
     /// it, and `flex` is used if neither is given. A run may go on on another device.
     #[serde(default)]
     pub device: Option<String>,

@@ -47,7 +47,7 @@ struct Arguments {
     /// Worker threads; changes the time, not the result [default: all cores].
     #[arg(long)]
     threads: Option<usize>,
-    /// Device: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda` where built in [default: `device` of
+    /// Device: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda`, `libtorch` where built in [default: `device` of
     /// the configuration, or flex].
     #[arg(long)]
     device: Option<String>,

@@ -23,7 +23,7 @@ pub struct MethodArgs {
     #[arg(long, value_name = "NAME|FILE")]
     pub weights: Option<String>,
 
-    /// Where the network runs: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda` where built in
+    /// Where the network runs: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda`, `libtorch` where built in
     #[arg(long, value_name = "NAME", default_value = "flex")]
     pub device: String,
 
