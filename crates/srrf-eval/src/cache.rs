@@ -193,6 +193,7 @@ mod tests {
             weights: None,
             settings: settings.into(),
             parallel_inside: false,
+            holds: &[],
         }
     }
 

@@ -46,6 +46,10 @@ pub struct Options {
     #[arg(long, value_name = "NUMBERS", value_delimiter = ',')]
     pub severities: Vec<u8>,
 
+    /// Each shape at one severity only, the severities in turn: many shapes in a fraction of the time
+    #[arg(long)]
+    pub spread: bool,
+
     /// Rows of the tables [default: identity, icp, oracle and the network with its branches]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub methods: Vec<String>,
@@ -129,8 +133,9 @@ pub enum Command {
     Tables(Box<TablesOptions>),
 }
 
-const PAIR_OPTIONS: [&str; 12] = [
+const PAIR_OPTIONS: [&str; 13] = [
     "data",
+    "spread",
     "shapes",
     "corruptions",
     "clean_only",
@@ -188,6 +193,7 @@ impl Options {
             seed: self.seed,
             pair: self.pair_config()?,
             dcp_poses: self.rotation == "dcp",
+            spread: self.spread,
         })
     }
 

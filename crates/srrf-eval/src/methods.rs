@@ -49,6 +49,16 @@ pub struct Method {
     /// Whether one call on a batch keeps all cores busy. Batches of other methods are run side by
     /// side.
     pub parallel_inside: bool,
+    /// Rows of another method that this one answers on its way, each with the branch that holds it: where
+    /// they are all that is wanted of the other, it need not run.
+    pub holds: &'static [(&'static str, &'static str)],
+}
+
+impl Method {
+    /// The branch that holds a row of another method.
+    pub fn branch_of(&self, row: &str) -> Option<&'static str> {
+        self.holds.iter().find(|(held, _)| *held == row).map(|(_, branch)| *branch)
+    }
 }
 
 /// An entry of the registry.
@@ -96,9 +106,14 @@ pub const METHODS: &[MethodEntry] = &[
     },
     optional("srrf+refine", &["srrf+refine"], |context| {
         let (register, weights) = srrf(context)?;
-        Ok(Method { weights: Some(weights), ..plain(Refined::new(register, RefineConfig::default())) })
+        let register = plain(Refined::new(register, RefineConfig::default()));
+        Ok(Method { weights: Some(weights), holds: UNREFINED, ..register })
     }),
 ];
+
+/// Rows of `srrf` that `srrf+refine` answers.
+const UNREFINED: &[(&str, &str)] =
+    &[("srrf-dense", "dense"), ("srrf-skeleton", "skeleton"), ("srrf", "unrefined")];
 
 /// An entry that runs only where `--methods` names it.
 const fn optional(
@@ -110,7 +125,13 @@ const fn optional(
 }
 
 fn plain(register: impl Register + 'static) -> Method {
-    Method { register: Box::new(register), weights: None, settings: String::new(), parallel_inside: false }
+    Method {
+        register: Box::new(register),
+        weights: None,
+        settings: String::new(),
+        parallel_inside: false,
+        holds: &[],
+    }
 }
 
 /// A learned baseline, with the weights of `--weights NAME=PATH` or those in the program.
@@ -249,7 +270,11 @@ impl Selection {
                 .map(|method| (entry.rows, method))
                 .map_err(|problem| EvalError::Setup { name: entry.name.to_owned(), problem })
         };
-        self.entries.iter().map(set_up).collect()
+        let mut methods: Vec<_> = self.entries.iter().map(set_up).collect::<Result<_, _>>()?;
+        let held: Vec<&str> =
+            methods.iter().flat_map(|(_, method)| method.holds.iter().map(|(row, _)| *row)).collect();
+        methods.retain(|(rows, _)| !rows.iter().all(|row| held.contains(row)));
+        Ok(methods)
     }
 }
 

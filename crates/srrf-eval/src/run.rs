@@ -222,15 +222,17 @@ impl Run<'_> {
         }
         let running = self.running();
         let filled = running.iter().zip(found).find(|((rows, _), _)| rows.contains(&row));
-        let Some(((_, method), found)) = filled else {
+        let held = || running.iter().zip(found).find(|((_, method), _)| method.branch_of(row).is_some());
+        let Some(((_, method), found)) = filled.or_else(held) else {
             return Answer::new(None, Some(format!("no method fills the row {row}")), truth);
         };
-        let seconds = Some(found.seconds.0);
+        // The time of a method that goes on is not the time of the row.
+        let seconds = method.branch_of(row).is_none().then_some(found.seconds.0);
         let poses = match &found.answer {
             Ok(poses) => poses,
             Err(failure) => return Answer { seconds, ..Answer::new(None, Some(failure.clone()), truth) },
         };
-        let (pose, failure) = match pose_of_row(poses, method.register.name(), row) {
+        let (pose, failure) = match pose_of_row(poses, method, row) {
             Some(pose) if is_finite(&pose) => (Some(pose), None),
             Some(_) => (None, Some("the pose is not finite".to_owned())),
             None => (None, Some("the method gave no pose for this branch".to_owned())),
@@ -246,11 +248,15 @@ impl Run<'_> {
 }
 
 /// The pose of the row `<method>`, or of the branch in the row `<method>-<branch>`.
-fn pose_of_row(found: &Poses, method: &str, row: &str) -> Option<Rigid> {
-    if row == method {
+fn pose_of_row(found: &Poses, method: &Method, row: &str) -> Option<Rigid> {
+    let name = method.register.name();
+    if row == name {
         return Some(found.pose);
     }
-    let branch = row.strip_prefix(method)?.strip_prefix('-')?;
+    let branch = match method.branch_of(row) {
+        Some(branch) => branch,
+        None => row.strip_prefix(name)?.strip_prefix('-')?,
+    };
     found.branches.iter().find(|b| b.name == branch).map(|b| b.pose)
 }
 
@@ -306,6 +312,7 @@ mod tests {
             seed: 3,
             pair: PairConfig { points: 129, ..PairConfig::default() },
             dcp_poses: false,
+            spread: false,
         };
         SynthesizedPairs::new(data::procedural(11).unwrap(), protocol).unwrap()
     }
@@ -321,8 +328,13 @@ mod tests {
         parallel_inside: bool,
         cache: Option<&Cache>,
     ) -> Outcome {
-        let moody =
-            Method { register: Box::new(Moody), weights: None, settings: String::new(), parallel_inside };
+        let moody = Method {
+            register: Box::new(Moody),
+            weights: None,
+            settings: String::new(),
+            parallel_inside,
+            holds: &[],
+        };
         let icp = crate::methods::METHODS.iter().find(|m| m.name == "icp").unwrap();
         let methods = vec![(ROWS, moody), (icp.rows, (icp.build)(&Default::default()).unwrap())];
         let rows = ["icp", ORACLE, "moody-left", "moody-right", "moody"].map(str::to_owned).to_vec();

@@ -32,6 +32,9 @@ pub struct Protocol {
     pub pair: PairConfig,
     /// Whether shape `i` has the pose of item `i` of DCP's test set instead of a seeded one.
     pub dcp_poses: bool,
+    /// Whether each shape is shown at one severity only, the severities in turn, so that as many shapes
+    /// cost a fraction of the time.
+    pub spread: bool,
 }
 
 /// Pairs made on demand. Pair `item` is derived from the seed and the number of its shape alone, so
@@ -53,6 +56,24 @@ enum Condition {
     Clean,
     Corrupted(CorruptionKind, Severity),
     Mixed(Mixture, Severity),
+}
+
+/// Which of the shapes a group shows: the first, and then every so many.
+struct Step {
+    first: usize,
+    by: usize,
+}
+
+impl Protocol {
+    fn step(&self, condition: Condition) -> Step {
+        match condition {
+            Condition::Corrupted(_, severity) | Condition::Mixed(_, severity) if self.spread => {
+                let first = self.severities.iter().position(|s| *s == severity).unwrap_or(0);
+                Step { first, by: self.severities.len() }
+            }
+            _ => Step { first: 0, by: 1 },
+        }
+    }
 }
 
 impl Condition {
@@ -89,7 +110,18 @@ impl SynthesizedPairs {
                     .into(),
             ));
         }
-        let groups = conditions.iter().map(|condition| condition.group(shapes.len())).collect();
+        let (severities, count) = (protocol.severities.len(), shapes.len());
+        if protocol.spread && count < severities {
+            return Err(EvalError::Usage(format!(
+                "{count} shapes cannot be spread over {severities} severities; give more --shapes, or leave \
+                 --spread out"
+            )));
+        }
+        let groups = conditions.iter().map(|condition| {
+            let step = protocol.step(*condition);
+            condition.group((count - step.first).div_ceil(step.by))
+        });
+        let groups = groups.collect();
         Ok(Self { source, shapes, synthesizer, protocol, conditions, groups })
     }
 }
@@ -132,9 +164,10 @@ impl PairSource for SynthesizedPairs {
             RotationRange::So3 => format!("all rotations, translation within {}", pair.translation),
         };
         format!(
-            "{}; {} shapes scored; corrupt {}, sampling {}, normalize {}, {} points; {poses}",
+            "{}; {} shapes scored{}; corrupt {}, sampling {}, normalize {}, {} points; {poses}",
             self.source.description(),
             self.shapes.len(),
+            if self.protocol.spread { ", each at one severity" } else { "" },
             word(pair.corrupt),
             word(pair.sampling),
             word(pair.normalize),
@@ -151,7 +184,8 @@ impl PairSource for SynthesizedPairs {
     }
 
     fn pair(&self, group: usize, item: usize) -> Result<EvalPair, EvalError> {
-        let shape = self.shapes[item];
+        let step = self.protocol.step(self.conditions[group]);
+        let shape = self.shapes[step.first + item * step.by];
         let stream = Stream { seed: self.protocol.seed, item: shape as u64 };
         let pose = if self.protocol.dcp_poses { PoseDraw::DcpTest(shape as u32) } else { PoseDraw::Seeded };
         let shapes = &*self.source;
@@ -191,6 +225,7 @@ mod tests {
             seed: 7,
             pair: PairConfig { points: 65, ..PairConfig::default() },
             dcp_poses: false,
+            spread: false,
         }
     }
 
@@ -206,6 +241,19 @@ mod tests {
         assert!(pairs.groups().iter().all(|g| g.pairs == 3));
         assert!(pairs.has_oracle());
         assert!(pairs.description().contains("corrupt both, sampling shared, normalize none, 65 points"));
+    }
+
+    #[test]
+    fn spread_shapes_are_shown_at_one_severity_each() {
+        let spread = pairs(Protocol { spread: true, ..protocol() });
+        // 3 shapes at 2 severities: the first and the third at the lower one.
+        assert_eq!(spread.groups().iter().map(|g| g.pairs).collect::<Vec<_>>(), [3, 2, 1, 2, 1]);
+        let all = pairs(protocol());
+        assert_eq!(spread.pair(1, 1).unwrap().pair, all.pair(1, 2).unwrap().pair);
+        assert_eq!(spread.pair(4, 0).unwrap().pair, all.pair(4, 1).unwrap().pair);
+        let few = Protocol { spread: true, shapes: 1, ..protocol() };
+        let error = SynthesizedPairs::new(data::procedural(1).unwrap(), few).err().unwrap();
+        assert!(error.to_string().contains("--spread"), "{error}");
     }
 
     #[test]

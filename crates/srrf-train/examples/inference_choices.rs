@@ -56,7 +56,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut method = SrrfRegister::new(loaded, device);
         method.passes = passes;
         let rows = score(&method, &held_out, &workers)?;
-        println!("| {passes} | {tokens} | {test:?} {threshold} {skeleton_threshold} | {sharpness} | {} |", rows.join(" | "));
+        println!(
+            "| {passes} | {tokens} | {test:?} {threshold} {skeleton_threshold} | {sharpness} | {} |",
+            rows.join(" | ")
+        );
     }
     Ok(())
 }

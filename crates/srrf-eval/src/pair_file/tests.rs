@@ -14,6 +14,7 @@ fn synthesized() -> SynthesizedPairs {
         seed: 3,
         pair: PairConfig { points: 67, ..PairConfig::default() },
         dcp_poses: false,
+        spread: false,
     };
     SynthesizedPairs::new(data::procedural(5).unwrap(), protocol).unwrap()
 }

@@ -55,6 +55,7 @@ pub(crate) fn main_protocol(options: &TablesOptions, shapes: usize) -> Protocol 
         seed: options.seed,
         pair: PairConfig { points: options.points, ..PairConfig::default() },
         dcp_poses: false,
+        spread: false,
     }
 }
 

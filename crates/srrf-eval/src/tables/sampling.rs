@@ -143,6 +143,7 @@ mod tests {
             seed: 3,
             pair: PairConfig { points: 67, ..PairConfig::default() },
             dcp_poses: false,
+            spread: false,
         };
         let clean = SynthesizedPairs::new(data::procedural(2).unwrap(), protocol).unwrap();
         let pairs = SampledPairs::new(clean, &FirstFive, 13, 3);

@@ -68,6 +68,7 @@ pub(crate) fn methods(context: &MethodContext) -> Result<Vec<(&'static [&'static
             weights: Some(weights),
             settings: format!("{test:?}, thresholds {dense} and {skeleton}, sharpness {sharpness}"),
             parallel_inside: false,
+            holds: &[],
         };
         Ok((rows, method))
     };

@@ -218,6 +218,7 @@ mod tests {
             seed: 3,
             pair: PairConfig { points: 65, ..PairConfig::default() },
             dcp_poses: false,
+            spread: false,
         };
         let pairs = SynthesizedPairs::new(data::procedural(3).unwrap(), protocol).unwrap();
         let run = Run {
