@@ -233,3 +233,69 @@ impl ModuleMapper for Spread {
         Param::from_mapped_value(id, value, mapper)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use burn::nn::{Linear, LinearConfig};
+    use burn::optim::AdamWConfig;
+    use burn::tensor::Device;
+    use srrf_model::init;
+    use srrf_model::weights::parameters;
+
+    use super::*;
+
+    #[derive(Module, Debug)]
+    struct Net {
+        first: Linear,
+        others: Vec<Linear>,
+        untrained: Linear,
+    }
+
+    fn net() -> Net {
+        let linear = |i, o| LinearConfig::new(i, o).init(&Device::flex());
+        let net =
+            Net { first: linear(3, 5), others: vec![linear(5, 7), linear(7, 2)], untrained: linear(2, 2) };
+        init::seeded(net, 11).valid()
+    }
+
+    /// The gradients of a loss that wants every output to be `aim`.
+    fn gradients(net: &Net, aim: f64) -> GradientsParams {
+        let net = net.clone().train();
+        let x = Tensor::<2>::from_floats([[0.3, -0.7, 1.1], [0.9, 0.2, -0.4]], &Device::flex().autodiff());
+        let x = net.others.iter().fold(net.first.forward(x), |x, layer| layer.forward(x));
+        GradientsParams::from_grads((x - aim).square().mean().backward(), &net)
+    }
+
+    #[test]
+    fn rows_give_the_steps_of_the_parameters_one_by_one() {
+        let optimizer = || AdamWConfig::new().with_weight_decay(0.1).init();
+        let (mut plain, mut alone) = (net(), optimizer());
+        let mut rows = net();
+        let mut updater = Updater::new(optimizer(), &rows);
+        for aim in [0.0, 1.0, -2.0, 0.5] {
+            let given = gradients(&plain, aim);
+            plain = alone.step(1e-2, plain.train(), given).valid();
+            let given = RowGradients::new(gradients(&rows, aim), &rows);
+            rows = updater.step(1e-2, rows, given);
+        }
+        assert_eq!(parameters(&plain), parameters(&rows));
+        let (start, moved) = (parameters(&net()), parameters(&rows));
+        for (name, value) in &start {
+            assert_eq!(moved[name] == *value, name.starts_with("untrained"), "{name}");
+        }
+    }
+
+    #[test]
+    fn means_norms_and_scales_are_over_all_parameters() {
+        let net = net();
+        let of = |aim| RowGradients::new(gradients(&net, aim), &net);
+        let (a, b) = (of(0.0), of(3.0));
+        assert_eq!((a.0.iter().flatten().count(), a.0.len()), (2, 3), "the last part has none");
+        let mut mean = RowGradients::mean(vec![a, b]);
+        let norm = mean.norm();
+        // The loss is quadratic, so its gradient at the mean of two aims is the mean of the gradients.
+        assert!(norm > 1e-3 && (norm - of(1.5).norm()).abs() < 1e-5 * norm);
+        mean.scale(0.5);
+        assert!((mean.norm() - 0.5 * norm).abs() < 1e-6 * norm);
+    }
+}
