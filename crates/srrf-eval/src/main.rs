@@ -75,9 +75,16 @@ fn run(options: &Options) -> Result<(), EvalError> {
         threads,
         cache: None,
     };
+    let mut tenths = 0;
     let outcome = run.execute(&mut |done, group| {
         bar.inc(done as u64);
         bar.set_message(group.to_owned());
+        // Where there is no terminal, a line after each tenth.
+        let now = 10 * bar.position() / bar.length().unwrap_or(1).max(1);
+        if bar.is_hidden() && now > tenths {
+            tenths = now;
+            say(&format!("{} of {} pairs, at {group}", bar.position(), bar.length().unwrap_or(0)));
+        }
     })?;
     bar.finish_and_clear();
 
