@@ -188,13 +188,7 @@ mod tests {
     use super::*;
 
     fn method(settings: &str) -> Method {
-        Method {
-            register: Box::new(Identity),
-            weights: None,
-            settings: settings.into(),
-            parallel_inside: false,
-            holds: &[],
-        }
+        Method { settings: settings.into(), ..crate::methods::plain(Identity) }
     }
 
     fn pair(item: u64) -> Pair {

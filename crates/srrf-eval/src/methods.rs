@@ -50,7 +50,7 @@ pub struct Method {
     /// side.
     pub parallel_inside: bool,
     /// Rows of another method that this one answers on its way, each with the branch that holds it: where
-    /// they are all that is wanted of the other, it need not run.
+    /// they are all that is wanted of the other, it need not run. As in its entry.
     pub holds: &'static [(&'static str, &'static str)],
 }
 
@@ -70,6 +70,8 @@ pub struct MethodEntry {
     pub rows: &'static [&'static str],
     /// Whether it runs when `--methods` is not given.
     pub by_default: bool,
+    /// As [`Method::holds`].
+    pub holds: &'static [(&'static str, &'static str)],
     /// Sets the method up; errors are in words.
     pub build: fn(&MethodContext) -> Result<Method, String>,
 }
@@ -77,14 +79,11 @@ pub struct MethodEntry {
 /// All methods, in the order of the tables. [`ORACLE`] is not among them: it is no `Register`, since
 /// it needs to know the correspondences.
 pub const METHODS: &[MethodEntry] = &[
-    MethodEntry { name: "identity", rows: &["identity"], by_default: true, build: |_| Ok(plain(Identity)) },
-    MethodEntry { name: "icp", rows: &["icp"], by_default: true, build: |_| Ok(plain(Icp::default())) },
-    MethodEntry {
-        name: "icp-centred",
-        rows: &["icp-centred"],
-        by_default: false,
-        build: |_| Ok(plain(Icp::new(IcpConfig { centred: true, ..IcpConfig::default() }))),
-    },
+    MethodEntry { by_default: true, ..optional("identity", &["identity"], |_| Ok(plain(Identity))) },
+    MethodEntry { by_default: true, ..optional("icp", &["icp"], |_| Ok(plain(Icp::default()))) },
+    optional("icp-centred", &["icp-centred"], |_| {
+        Ok(plain(Icp::new(IcpConfig { centred: true, ..IcpConfig::default() })))
+    }),
     optional("icp-plane", &["icp-plane"], |_| Ok(plain(IcpPlane::default()))),
     optional("icp-trimmed", &["icp-trimmed"], |_| Ok(plain(IcpTrimmed::default()))),
     optional("icp-robust", &["icp-robust"], |_| Ok(plain(IcpRobust::default()))),
@@ -96,19 +95,20 @@ pub const METHODS: &[MethodEntry] = &[
     optional("panet", &["panet"], learned::<PanetConfig>),
     optional("equi-gspr", &["equi-gspr"], learned::<EquiGsprConfig>),
     MethodEntry {
-        name: "srrf",
-        rows: &["srrf-dense", "srrf-skeleton", "srrf"],
         by_default: true,
-        build: |context| {
+        ..optional("srrf", &["srrf-dense", "srrf-skeleton", "srrf"], |context| {
             let (register, weights) = srrf(context)?;
             Ok(Method { weights: Some(weights), ..plain(register) })
-        },
+        })
     },
-    optional("srrf+refine", &["srrf+refine"], |context| {
-        let (register, weights) = srrf(context)?;
-        let register = plain(Refined::new(register, RefineConfig::default()));
-        Ok(Method { weights: Some(weights), holds: UNREFINED, ..register })
-    }),
+    MethodEntry {
+        holds: UNREFINED,
+        ..optional("srrf+refine", &["srrf+refine"], |context| {
+            let (register, weights) = srrf(context)?;
+            let method = plain(Refined::new(register, RefineConfig::default()));
+            Ok(Method { weights: Some(weights), holds: UNREFINED, ..method })
+        })
+    },
 ];
 
 /// Rows of `srrf` that `srrf+refine` answers.
@@ -121,10 +121,11 @@ const fn optional(
     rows: &'static [&'static str],
     build: fn(&MethodContext) -> Result<Method, String>,
 ) -> MethodEntry {
-    MethodEntry { name, rows, by_default: false, build }
+    MethodEntry { name, rows, by_default: false, holds: &[], build }
 }
 
-fn plain(register: impl Register + 'static) -> Method {
+/// A method that learns nothing, with its defaults.
+pub(crate) fn plain(register: impl Register + 'static) -> Method {
     Method {
         register: Box::new(register),
         weights: None,
@@ -270,11 +271,9 @@ impl Selection {
                 .map(|method| (entry.rows, method))
                 .map_err(|problem| EvalError::Setup { name: entry.name.to_owned(), problem })
         };
-        let mut methods: Vec<_> = self.entries.iter().map(set_up).collect::<Result<_, _>>()?;
-        let held: Vec<&str> =
-            methods.iter().flat_map(|(_, method)| method.holds.iter().map(|(row, _)| *row)).collect();
-        methods.retain(|(rows, _)| !rows.iter().all(|row| held.contains(row)));
-        Ok(methods)
+        let held: Vec<&str> = self.entries.iter().flat_map(|e| e.holds).map(|(row, _)| *row).collect();
+        let runs = |entry: &&&MethodEntry| !entry.rows.iter().all(|row| held.contains(row));
+        self.entries.iter().filter(runs).map(set_up).collect()
     }
 }
 
@@ -296,6 +295,22 @@ mod tests {
             };
             assert_eq!(method.register.name(), entry.name);
             assert_eq!(entry.rows.last(), Some(&entry.name));
+        }
+    }
+
+    #[test]
+    fn a_method_that_answers_anothers_rows_runs_in_its_place() {
+        let context = MethodContext::of_srrf(None, "flex");
+        let running = |list: &[&str]| -> Vec<String> {
+            let names: Vec<String> = list.iter().map(|n| (*n).to_owned()).collect();
+            let methods = select(&names).unwrap().set_up(&context).unwrap();
+            methods.iter().map(|(_, method)| method.register.name().to_owned()).collect()
+        };
+        assert_eq!(running(&["srrf-dense", "srrf", "srrf+refine"]), ["srrf+refine"]);
+        assert_eq!(running(&["icp", "srrf-dense"]), ["icp", "srrf"]);
+        for entry in METHODS {
+            let holds = (entry.build)(&context).map(|method| method.holds);
+            assert!(holds.is_err() || holds == Ok(entry.holds), "{}", entry.name);
         }
     }
 

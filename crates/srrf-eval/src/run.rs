@@ -226,8 +226,9 @@ impl Run<'_> {
         let Some(((_, method), found)) = filled.or_else(held) else {
             return Answer::new(None, Some(format!("no method fills the row {row}")), truth);
         };
-        // The time of a method that goes on is not the time of the row.
-        let seconds = method.branch_of(row).is_none().then_some(found.seconds.0);
+        // What a method that goes on took, and how it ended, is not the row's.
+        let own = method.branch_of(row).is_none();
+        let seconds = own.then_some(found.seconds.0);
         let poses = match &found.answer {
             Ok(poses) => poses,
             Err(failure) => return Answer { seconds, ..Answer::new(None, Some(failure.clone()), truth) },
@@ -239,8 +240,8 @@ impl Run<'_> {
         };
         Answer {
             seconds,
-            iterations: Some(poses.iterations),
-            converged: Some(poses.converged),
+            iterations: own.then_some(poses.iterations),
+            converged: own.then_some(poses.converged),
             skeletons: poses.agreement().filter(|_| row == method.register.name()),
             ..Answer::new(pose, failure, truth)
         }
@@ -328,13 +329,7 @@ mod tests {
         parallel_inside: bool,
         cache: Option<&Cache>,
     ) -> Outcome {
-        let moody = Method {
-            register: Box::new(Moody),
-            weights: None,
-            settings: String::new(),
-            parallel_inside,
-            holds: &[],
-        };
+        let moody = Method { parallel_inside, ..crate::methods::plain(Moody) };
         let icp = crate::methods::METHODS.iter().find(|m| m.name == "icp").unwrap();
         let methods = vec![(ROWS, moody), (icp.rows, (icp.build)(&Default::default()).unwrap())];
         let rows = ["icp", ORACLE, "moody-left", "moody-right", "moody"].map(str::to_owned).to_vec();

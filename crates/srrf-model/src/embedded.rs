@@ -20,8 +20,9 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 }
 
 /// An embedded model by name: `srrf-small` (trained on ModelNet40, the default), `srrf` (the full-size one,
-/// trained on the same shapes on a GPU) or `srrf-shapes` (trained on the built-in shapes). `None` if there is no model of that name. What `srrf-small` was trained from lies
-/// beside it as files, `srrf-small-start` and `srrf-small-2`.
+/// trained on the same shapes on a GPU) or `srrf-shapes` (trained on the built-in shapes). `None` if there
+/// is no model of that name. What `srrf-small` was trained from lies beside it as files, `srrf-small-start`
+/// and `srrf-small-2`.
 pub fn load(name: &str, device: &Device) -> Option<Result<LoadedModel, WeightsError>> {
     let (name, bytes) = EMBEDDED.iter().find(|(known, _)| *known == name)?;
     Some(from_safetensors(bytes, &format!("embedded weights {name}"), device))

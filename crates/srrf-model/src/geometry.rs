@@ -295,16 +295,21 @@ pub fn even_subsample(points: &[[f32; 3]], count: usize, phase: f32) -> Vec<u32>
     (0..count).map(|i| chosen[i % taken]).collect()
 }
 
-/// [`even_subsample`] of each cloud: `[batch, tokens, 3]` of `[batch, points, 3]`; all points where
-/// `tokens` is 0 or not below their number.
+/// Row numbers of the points that carry tokens: [`even_subsample`] of each cloud. `None` where all do,
+/// that is, where `tokens` is 0 or not below their number.
+pub fn token_rows(clouds: &HostClouds, tokens: usize, phase: f32) -> Option<Vec<i64>> {
+    let points = clouds.per_cloud();
+    let some = tokens > 0 && tokens < points;
+    some.then(|| flat_indices(clouds, points, |_, cloud| even_subsample(cloud, tokens, phase)))
+}
+
+/// The points at [`token_rows`]: `[batch, tokens, 3]` of `[batch, points, 3]`.
 pub fn even_tokens(clouds: Tensor<3>, tokens: usize, phase: f32) -> Tensor<3> {
     let [batch, points, _] = clouds.dims();
-    if tokens == 0 || tokens >= points {
-        return clouds;
+    match token_rows(&HostClouds::read(&clouds), tokens, phase) {
+        Some(chosen) => rows(clouds.reshape([batch * points, 3]), &chosen).reshape([batch, tokens, 3]),
+        None => clouds,
     }
-    let host = HostClouds::read(&clouds);
-    let chosen = flat_indices(&host, points, |_, cloud| even_subsample(cloud, tokens, phase));
-    rows(clouds.reshape([batch * points, 3]), &chosen).reshape([batch, tokens, 3])
 }
 
 /// Interleaves the low 10 bits of three numbers.

@@ -122,18 +122,16 @@ impl IntegrationConfig {
                     |a: &[[f32; 3]], b: &[[f32; 3]]| a.iter().zip(b).filter(|(a, b)| near(a, b)).count();
                 moved.iter().zip(matches.iter()).map(|(a, b)| count(a, b) as f64 / a.len() as f64).collect()
             }
-            InlierTest::Nearest => {
-                let moved = HostClouds::read(&transform(source.clone().detach(), rotation, translation));
-                let target = HostClouds::read(target);
-                let clouds: Vec<_> = moved.iter().zip(target.iter()).collect();
-                clouds.par_iter().map(|(a, b)| share_within(a, b, threshold as f32)).collect()
-            }
-            InlierTest::BothWays => {
+            InlierTest::Nearest | InlierTest::BothWays => {
                 let moved = HostClouds::read(&transform(source.clone().detach(), rotation, translation));
                 let target = HostClouds::read(target);
                 let clouds: Vec<_> = moved.iter().zip(target.iter()).collect();
                 let share = |a, b| share_within(a, b, threshold as f32);
-                clouds.par_iter().map(|(a, b)| 0.5 * (share(a, b) + share(b, a))).collect()
+                let ratio = |(a, b): &(_, _)| match self.test {
+                    InlierTest::BothWays => 0.5 * (share(*a, *b) + share(*b, *a)),
+                    _ => share(*a, *b),
+                };
+                clouds.par_iter().map(ratio).collect()
             }
         }
     }

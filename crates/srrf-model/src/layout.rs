@@ -3,7 +3,7 @@
 //! step that uses it, while a GPU is busy with the one before.
 
 use crate::branch::BranchConfig;
-use crate::geometry::{HostClouds, even_subsample, farthest_points, flat_indices, k_nearest};
+use crate::geometry::{HostClouds, farthest_points, flat_indices, k_nearest, token_rows};
 use crate::sem::{LevelConfig, SemConfig};
 use crate::srrf::SrrfConfig;
 
@@ -69,10 +69,8 @@ impl BranchLayout {
     /// `tokens` of each cloud (0 for all) along a space-filling curve, from `phase` in [0, 1), and their
     /// `neighbours`.
     pub fn new(clouds: &HostClouds, tokens: usize, neighbours: usize, phase: f32) -> Self {
-        let points = clouds.per_cloud();
-        let per_cloud = if tokens == 0 { points } else { tokens.min(points) };
-        let chosen = (per_cloud < points)
-            .then(|| flat_indices(clouds, points, |_, cloud| even_subsample(cloud, per_cloud, phase)));
+        let chosen = token_rows(clouds, tokens, phase);
+        let per_cloud = if chosen.is_some() { tokens } else { clouds.per_cloud() };
         let neighbours = match &chosen {
             Some(chosen) => Neighbourhood::new(&clouds.select(chosen, per_cloud), clouds, neighbours),
             None => Neighbourhood::new(clouds, clouds, neighbours),

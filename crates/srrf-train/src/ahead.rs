@@ -9,7 +9,6 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 pub struct Ahead<T> {
     shelf: Mutex<Shelf<T>>,
     changed: Condvar,
-    depth: usize,
 }
 
 struct Shelf<T> {
@@ -26,7 +25,7 @@ impl<T: Send> Ahead<T> {
     /// Items from number `first` on, at most `depth` more than were taken.
     pub fn new(first: usize, depth: usize) -> Self {
         let shelf = Shelf { next: first, end: first + depth, ready: BTreeMap::new(), closed: false };
-        Self { shelf: Mutex::new(shelf), changed: Condvar::new(), depth }
+        Self { shelf: Mutex::new(shelf), changed: Condvar::new() }
     }
 
     /// Makes items until [`Ahead::close`]: what each of the threads does.
@@ -71,11 +70,6 @@ impl<T: Send> Ahead<T> {
         self.changed.notify_all();
     }
 
-    /// How many items may wait.
-    pub fn depth(&self) -> usize {
-        self.depth
-    }
-
     fn lock(&self) -> MutexGuard<'_, Shelf<T>> {
         self.shelf.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -98,7 +92,8 @@ mod tests {
 
     #[test]
     fn items_come_by_number_and_not_too_early() {
-        let (ahead, most) = (Ahead::new(5, 3), AtomicUsize::new(0));
+        const DEPTH: usize = 3;
+        let (ahead, most) = (Ahead::new(5, DEPTH), AtomicUsize::new(0));
         std::thread::scope(|scope| {
             let _closing = Closing(&ahead);
             for _ in 0..4 {
@@ -112,7 +107,7 @@ mod tests {
             // Within the depth the order is the taker's.
             for (taken, i) in [6, 5, 7, 9, 8, 10].into_iter().enumerate() {
                 assert_eq!(ahead.take(i), Some(i * i));
-                assert!(most.load(Ordering::Relaxed) < 5 + taken + 1 + ahead.depth());
+                assert!(most.load(Ordering::Relaxed) < 5 + taken + 1 + DEPTH);
             }
         });
         assert_eq!(ahead.take(1000), None, "closed");

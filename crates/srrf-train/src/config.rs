@@ -197,6 +197,13 @@ pub struct OptimizerConfig {
     pub clip_norm: f64,
 }
 
+impl OptimizerConfig {
+    /// Shards a batch.
+    pub fn shards(&self) -> usize {
+        self.batch / self.shard
+    }
+}
+
 /// Kinds of optimisers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

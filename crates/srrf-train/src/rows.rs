@@ -6,20 +6,22 @@ use burn::module::{Module, ModuleMapper, ModuleVisitor, Param, ParamId};
 use burn::optim::{GradientsParams, ModuleOptimizer};
 use burn::tensor::Tensor;
 
+/// The parameters of a part as rows, each with its gradient if it has one.
+type Part = Vec<(Tensor<1>, Option<Tensor<1>>)>;
+
 /// The gradient of each part; none where nothing in it was trained.
 pub struct RowGradients(Vec<Option<Tensor<1>>>);
 
 impl RowGradients {
-    /// The gradients of `network`, without those of other modules.
+    /// The gradients of `network`, which must be off the graph, without those of other modules.
     pub fn new<M: Module>(gradients: GradientsParams, network: &M) -> Self {
-        let mut rows = GradientRows { gradients, path: Path::default(), parts: Vec::new() };
-        network.visit(&mut rows);
-        let whole = |part: Vec<(Option<Tensor<1>>, Zeros)>| {
-            let trained = part.iter().any(|(gradient, _)| gradient.is_some());
-            let filled = part.into_iter().map(|(gradient, zeros)| gradient.unwrap_or_else(|| zeros.tensor()));
+        let whole = |part: Part| {
+            let trained = part.iter().any(|(_, gradient)| gradient.is_some());
+            let filled =
+                part.into_iter().map(|(value, gradient)| gradient.unwrap_or_else(|| value.zeros_like()));
             trained.then(|| Tensor::cat(filled.collect(), 0))
         };
-        Self(rows.parts.into_iter().map(whole).collect())
+        Self(Collector::of(network, gradients).into_iter().map(whole).collect())
     }
 
     /// The mean, summed in the order given.
@@ -68,13 +70,13 @@ impl Updater {
     /// The optimiser, new or with the state that [`Updater::optimizer`] had, on the parameters of `network`,
     /// which must be off the graph.
     pub fn new<M: Module>(optimizer: ModuleOptimizer, network: &M) -> Self {
-        let mut rows = ParameterRows::default();
-        network.visit(&mut rows);
-        let part = |(i, part): (usize, Vec<Tensor<1>>)| {
+        let part = |(i, part): (usize, Part)| {
+            let values = part.into_iter().map(|(value, _)| value).collect();
             // Numbered in order, so that the state finds its rows again in another process.
-            Param::initialized(ParamId::from(i as u64 + 1), Tensor::cat(part, 0))
+            Param::initialized(ParamId::from(i as u64 + 1), Tensor::cat(values, 0))
         };
-        Self { optimizer, rows: Rows { parts: rows.parts.into_iter().enumerate().map(part).collect() } }
+        let parts = Collector::of(network, GradientsParams::new());
+        Self { optimizer, rows: Rows { parts: parts.into_iter().enumerate().map(part).collect() } }
     }
 
     /// What a checkpoint keeps.
@@ -106,22 +108,19 @@ struct Rows {
     parts: Vec<Param<Tensor<1>>>,
 }
 
-/// Which part a visit is in: a new one begins with each top-level field.
+/// Which part a visit is in: a new one begins with the first parameter of each top-level field.
 #[derive(Default)]
 struct Path {
     depth: usize,
-    field: String,
+    /// Whether the field has not had a parameter yet.
+    fresh: bool,
     /// Parts begun.
     begun: usize,
-    /// The field of the part begun last.
-    last: Option<String>,
 }
 
 impl Path {
-    fn enter(&mut self, name: &str) {
-        if self.depth == 0 {
-            self.field = name.to_string();
-        }
+    fn enter(&mut self) {
+        self.fresh |= self.depth == 0;
         self.depth += 1;
     }
 
@@ -131,33 +130,30 @@ impl Path {
 
     /// Number of the part that the next parameter belongs to, and whether it is its first.
     fn part(&mut self) -> (usize, bool) {
-        let first = self.last.as_ref() != Some(&self.field);
-        if first {
-            self.last = Some(self.field.clone());
-            self.begun += 1;
-        }
+        let first = std::mem::take(&mut self.fresh);
+        self.begun += usize::from(first);
         (self.begun - 1, first)
     }
 }
 
-/// What stands for a gradient that there is none of.
-struct Zeros(Box<dyn Fn() -> Tensor<1>>);
+/// Collects the parameters of each part as rows, with their gradients where there are any.
+struct Collector {
+    gradients: GradientsParams,
+    path: Path,
+    parts: Vec<Part>,
+}
 
-impl Zeros {
-    fn tensor(&self) -> Tensor<1> {
-        (self.0)()
+impl Collector {
+    fn of<M: Module>(network: &M, gradients: GradientsParams) -> Vec<Part> {
+        let mut collector = Self { gradients, path: Path::default(), parts: Vec::new() };
+        network.visit(&mut collector);
+        collector.parts
     }
 }
 
-struct GradientRows {
-    gradients: GradientsParams,
-    path: Path,
-    parts: Vec<Vec<(Option<Tensor<1>>, Zeros)>>,
-}
-
-impl ModuleVisitor for GradientRows {
-    fn enter_module(&mut self, name: &str, _container_type: &str) {
-        self.path.enter(name);
+impl ModuleVisitor for Collector {
+    fn enter_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.enter();
     }
 
     fn exit_module(&mut self, _name: &str, _container_type: &str) {
@@ -172,35 +168,7 @@ impl ModuleVisitor for GradientRows {
         let value = param.val();
         let count = value.shape().num_elements();
         let gradient = self.gradients.remove::<D>(param.id).map(|g| g.reshape([count]));
-        let device = value.device().without_autodiff();
-        let zeros = Zeros(Box::new(move || Tensor::zeros([count], (&device, value.dtype()))));
-        self.parts[part].push((gradient, zeros));
-    }
-}
-
-#[derive(Default)]
-struct ParameterRows {
-    path: Path,
-    parts: Vec<Vec<Tensor<1>>>,
-}
-
-impl ModuleVisitor for ParameterRows {
-    fn enter_module(&mut self, name: &str, _container_type: &str) {
-        self.path.enter(name);
-    }
-
-    fn exit_module(&mut self, _name: &str, _container_type: &str) {
-        self.path.exit();
-    }
-
-    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let (part, first) = self.path.part();
-        if first {
-            self.parts.push(Vec::new());
-        }
-        let value = param.val();
-        let count = value.shape().num_elements();
-        self.parts[part].push(value.reshape([count]));
+        self.parts[part].push((value.reshape([count]), gradient));
     }
 }
 
@@ -212,8 +180,8 @@ struct Spread {
 }
 
 impl ModuleMapper for Spread {
-    fn enter_module(&mut self, name: &str, _container_type: &str) {
-        self.path.enter(name);
+    fn enter_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.enter();
     }
 
     fn exit_module(&mut self, _name: &str, _container_type: &str) {

@@ -161,7 +161,7 @@ pub fn run<C: Trained>(
         return run.go(stop, None);
     }
     // The device computes elsewhere: all threads make pairs ahead of it.
-    let shards = config.optimizer.batch / config.optimizer.shard;
+    let shards = config.optimizer.shards();
     let ahead = Ahead::new(run.progress.step * shards, shards + 2 * options.threads);
     let (pairs, plan) = (run.pairs.clone(), run.plan.clone());
     std::thread::scope(|scope| {
@@ -273,7 +273,7 @@ impl<'a, C: Trained> Run<'a, C> {
         let held_out = pairs.validation(severity).map_err(StepError::from)?;
         let plan = Plan::new(config, pairs.epoch_length());
         let log = Log::open(folder, progress.step).map_err(|e| io(folder, e))?;
-        let shards = config.optimizer.batch / config.optimizer.shard;
+        let shards = config.optimizer.shards();
         let workers = match on_accelerator(config) {
             true => Workers::wide(shards.min(options.threads), options.threads)?,
             false => Workers::new(options.threads)?,

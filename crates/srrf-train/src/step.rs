@@ -13,7 +13,7 @@ use srrf_corrupt::Pair;
 use srrf_model::{HostPairs, SrrfConfig};
 
 use crate::ahead::Ahead;
-use crate::config::{OptimizerConfig, StageConfig, TrainConfig};
+use crate::config::{StageConfig, TrainConfig};
 use crate::data::TrainingPairs;
 use crate::network::{Shard, Trained};
 use crate::rows::RowGradients;
@@ -146,8 +146,7 @@ pub fn gradient<C: Trained>(
     step: usize,
     workers: &Workers,
 ) -> Result<StepOutcome, StepError> {
-    let OptimizerConfig { batch, shard: size, .. } = context.config.optimizer;
-    let shards = batch / size;
+    let shards = context.config.optimizer.shards();
     let run = |i: usize| shard(context, model, step * shards + i);
     let parts = workers.map(shards, run).ok_or(StepError::Worker)?;
 

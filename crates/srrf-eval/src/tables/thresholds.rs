@@ -5,7 +5,7 @@ use srrf_corrupt::CorruptionKind;
 use srrf_model::{InlierTest, SrrfRegister};
 
 use crate::EvalError;
-use crate::methods::{Method, MethodContext, network};
+use crate::methods::{Method, MethodContext, network, plain};
 
 /// The corruptions that are scored: two of density, two of noise, one of shape.
 pub(crate) const CORRUPTIONS: [CorruptionKind; 5] = [
@@ -64,11 +64,9 @@ pub(crate) fn methods(context: &MethodContext) -> Result<Vec<(&'static [&'static
         loaded.config.integration.sharpness = sharpness;
         let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
         let method = Method {
-            register: Box::new(Named { inner: SrrfRegister::new(loaded, device), name: rows[0] }),
             weights: Some(weights),
             settings: format!("{test:?}, thresholds {dense} and {skeleton}, sharpness {sharpness}"),
-            parallel_inside: false,
-            holds: &[],
+            ..plain(Named { inner: SrrfRegister::new(loaded, device), name: rows[0] })
         };
         Ok((rows, method))
     };

@@ -118,6 +118,13 @@ fn through_relu(gradient: &Tensor, output: &Tensor) -> Tensor {
     gradient.masked_fill(&output.le(0.0), 0.0)
 }
 
+/// The gradient of what was normalised, from that of the normal values: `mean` is over what was
+/// normalised together.
+fn through_norm(dn: &Tensor, normal: &Tensor, inverse: &Tensor, mean: impl Fn(&Tensor) -> Tensor) -> Tensor {
+    let slope = mean(&(dn * normal));
+    (dn - mean(dn) - normal * slope) * inverse
+}
+
 fn sum_rows(x: &Tensor) -> Tensor {
     x.sum_dim_intlist([0_i64].as_slice(), false, None::<Kind>)
 }
@@ -232,9 +239,7 @@ impl Backward<LibTorch, 4> for AddNormBackward {
         let (normal, g) = (&normal.tensor, gradients.consume::<LibTorch>(&ops.node).tensor);
         let dn = &g * &gamma.tensor;
         let mean = |x: &Tensor| x.mean_dim([1_i64].as_slice(), true, None::<Kind>);
-        let slope = mean(&(&dn * normal));
-        let dx = (&dn - mean(&dn) - normal * slope) * &inverse.tensor;
-        let dx = TchTensor::new(dx);
+        let dx = TchTensor::new(through_norm(&dn, normal, &inverse.tensor, mean));
         let [for_a, for_b, for_gamma, for_beta] = ops.parents;
         for node in [for_a, for_b].into_iter().flatten() {
             gradients.register::<LibTorch>(node.id, dx.clone());
@@ -272,8 +277,7 @@ impl Backward<LibTorch, 3> for GroupNormBackward {
             let (clouds, groups) = (inverse.size()[0], inverse.size()[2]);
             let grouped = [clouds, rows / clouds, groups, channels / groups];
             let (dn, n) = ((&g * &gamma.tensor).reshape(grouped), normal.reshape(grouped));
-            let slope = mean_of_groups(&(&dn * &n));
-            let dx = (&dn - mean_of_groups(&dn) - n * slope) * inverse;
+            let dx = through_norm(&dn, &n, inverse, mean_of_groups);
             gradients.register::<LibTorch>(node.id, TchTensor::new(dx.reshape([rows, channels])));
         }
         if let Some(node) = for_gamma {

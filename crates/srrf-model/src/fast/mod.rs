@@ -1,7 +1,8 @@
 //! Custom operations for the blocks where the time goes: a linear layer with its activation,
 //! multi-head attention, the sum of two tensors under a layer norm, group norm, and the gathering of
 //! neighbours. Each is one node of the graph with a hand-written backward pass, on Burn's flex backend and
-//! on LibTorch, in `f32`; every other backend and number type takes the composition of Burn's own operations in [`composed`].
+//! on LibTorch, in `f32`; every other backend and number type takes the composition of Burn's own operations
+//! in [`composed`].
 //!
 //! The two ways are the same mathematics; `tests/fast.rs` holds them against each other and against
 //! finite differences.
