@@ -11,6 +11,7 @@ mod fps;
 pub mod io;
 mod neighbours;
 mod normals;
+pub mod profile;
 mod register;
 mod rigid;
 pub mod shapes;

@@ -62,7 +62,11 @@ pub struct Options {
     #[arg(long, value_name = "NAME", default_value = "flex")]
     pub device: String,
 
-    /// Trained weights of srrf: a file, or `srrf-small` or `srrf-shapes` in the program [default:
+    /// Print at the end what time each method, and each stage of the network in it, took, over all threads
+    #[arg(long)]
+    pub profile: bool,
+
+    /// Trained weights of srrf: a file, or `srrf-small`, `srrf` or `srrf-shapes` in the program [default:
     /// srrf-small]; or METHOD=PATH for those of a learned baseline. May be given more than once
     #[arg(long, value_name = "PATH")]
     pub weights: Vec<String>,

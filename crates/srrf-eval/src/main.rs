@@ -7,6 +7,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
+use srrf_cloud::profile;
 use srrf_eval::tables::{self, Progress};
 use srrf_eval::{
     Command, EvalError, Meta, MethodContext, Options, PairFile, PairSource, Run, Summary, SynthesizedPairs,
@@ -31,6 +32,9 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> Result<(), EvalError> {
     let (start, threads) = (Instant::now(), options.thread_count()?);
+    if options.profile {
+        profile::start();
+    }
     let mut selection = srrf_eval::select(&options.methods)?;
     report::prepare(&options.out)?;
     let pairs = open_pairs(options)?;
@@ -107,6 +111,9 @@ fn run(options: &Options) -> Result<(), EvalError> {
     let written = report::write(&options.out, &meta, &summary, &outcome)?;
     say("");
     say(&report::screen(&summary));
+    if options.profile {
+        say(&profile::report().to_string());
+    }
     let names: Vec<String> =
         written.iter().filter_map(|p| Some(p.file_name()?.to_string_lossy().into_owned())).collect();
     say(&format!(

@@ -3,14 +3,14 @@
 use std::time::Instant;
 
 use rayon::prelude::*;
-use srrf_cloud::Rigid;
+use srrf_cloud::{Rigid, profile};
 use srrf_corrupt::oracle_pose;
 
 use crate::EvalError;
 use crate::cache::{Cache, PairHash};
 use crate::chamfer::{CleanShape, SkeletonAgreement};
 use crate::found::{Found, Poses};
-use crate::methods::{Method, ORACLE};
+use crate::methods::{METHODS, Method, ORACLE};
 use crate::metrics::{PairError, is_finite};
 use crate::pairs::{EvalPair, Group, PairSource};
 use crate::transforms::Transforms;
@@ -168,10 +168,12 @@ impl Run<'_> {
     /// One method on pairs: batch after batch where the method spreads over the cores itself, side by
     /// side where it does not.
     fn register(&self, method: &Method, pairs: &[&EvalPair]) -> Vec<Found> {
+        let known = METHODS.iter().find(|entry| entry.name == method.register.name());
+        let name = known.map_or("another method", |entry| entry.name);
         let call = |batch: &[&EvalPair]| -> Vec<Found> {
             let clouds: Vec<_> = batch.iter().map(|p| (&p.pair.source, &p.pair.target)).collect();
             let start = Instant::now();
-            let answers = method.register.register_batch(&clouds);
+            let answers = profile::stage(name, || method.register.register_batch(&clouds));
             let seconds = start.elapsed().as_secs_f64() / batch.len() as f64;
             let truths = batch.iter().map(|p| &p.pair.target_from_source);
             answers.into_iter().zip(truths).map(|(a, truth)| Found::new(a, truth, seconds)).collect()

@@ -13,6 +13,7 @@ use crate::matching::SoftMatching;
 use crate::pfi::{Pfi, PfiConfig};
 use crate::procrustes::{procrustes, weighted_procrustes};
 use crate::sfe::{Sfe, SfeConfig};
+use crate::timing::timed;
 
 /// Sizes of one branch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -116,16 +117,21 @@ impl Branch {
             Some(chosen) => rows(clouds.clone().reshape([both * points, 3]), chosen).reshape([both, n, 3]),
             None => clouds.clone(),
         };
-        let features = self.sfe.forward_with(clouds, n, &layout.neighbours); // F
-        let features = self.pfi.forward(features, tokens.clone()); // Phi
+        let device = tokens.device();
+        let features = timed("sfe", &device, || self.sfe.forward_with(clouds, n, &layout.neighbours)); // F
+        let features = timed("pfi", &device, || self.pfi.forward(features, tokens.clone())); // Phi
         let half = |x: &Tensor<3>, which: usize| x.clone().narrow(0, which * batch, batch);
         let (source_points, target_points) = (half(&tokens, 0), half(&tokens, 1));
-        let matches = self.matching.forward(half(&features, 0), half(&features, 1), target_points.clone());
-        let confidence = self.confidence.as_ref().map(|c| c.forward(half(&features, 0)));
-        let (rotation, translation) = match confidence {
-            Some(weights) => weighted_procrustes(source_points.clone(), matches.points.clone(), weights),
-            None => procrustes(source_points.clone(), matches.points.clone()),
-        };
+        let matches = timed("matching", &device, || {
+            self.matching.forward(half(&features, 0), half(&features, 1), target_points.clone())
+        });
+        let (rotation, translation) = timed("svd", &device, || {
+            let confidence = self.confidence.as_ref().map(|c| c.forward(half(&features, 0)));
+            match confidence {
+                Some(weights) => weighted_procrustes(source_points.clone(), matches.points.clone(), weights),
+                None => procrustes(source_points.clone(), matches.points.clone()),
+            }
+        });
         BranchOutput {
             rotation,
             translation,

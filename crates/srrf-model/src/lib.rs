@@ -30,6 +30,7 @@ mod sem_loss;
 mod sfe;
 mod sizes;
 mod srrf;
+mod timing;
 pub mod weights;
 
 pub use batch::{HostPairs, PairBatch, PairFrame};
@@ -37,7 +38,7 @@ pub use branch::{Branch, BranchConfig, BranchOutput};
 pub use device::{DeviceError, NAMES as DEVICE_NAMES, built_in as built_in_devices, device, is_accelerator};
 pub use integration::{BranchPose, Fusion, InlierTest, IntegrationConfig};
 pub use layout::{BranchLayout, Neighbourhood, SemLayout, SrrfLayout};
-pub use loss::{correspondence_loss, registration_loss};
+pub use loss::{correspondence_loss, matching_loss, registration_loss};
 pub use matching::{SoftMatches, SoftMatching, soft_matches};
 pub use memory::keep_freed_memory;
 pub use norm::GroupNorm;

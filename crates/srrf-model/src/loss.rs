@@ -1,5 +1,6 @@
 //! The registration loss.
 
+use burn::tensor::activation::softmax;
 use burn::tensor::{Tensor, TensorData};
 
 use crate::procrustes::transform;
@@ -23,6 +24,41 @@ pub fn registration_loss(
         Tensor::<3>::from_data(TensorData::new(identity, [1, 3, 3]), (&device, true_rotation.dtype()));
     let difference = rotation.transpose().matmul(true_rotation) - identity;
     difference.square().mean() + (translation - true_translation).square().mean()
+}
+
+/// Kullback-Leibler divergence of the matching probabilities from what the true pose says. Not in the paper:
+/// RGM, DIT and others teach matches by a cross-entropy with the one true match; where the points of the two clouds
+/// do not coincide, there is none, so each source point has a label that falls off as a Gaussian around its
+/// true place, half as wide as the target points are apart. Source points with nothing near their true place
+/// (cut away, or background) count little.
+///
+/// # Shapes
+/// - `probabilities`: `[batch, n, m]`, `points`: `[batch, n, 3]`, `targets`: `[batch, m, 3]`, output `[1]`
+pub fn matching_loss(
+    probabilities: Tensor<3>,
+    points: Tensor<3>,
+    targets: Tensor<3>,
+    true_rotation: Tensor<3>,
+    true_translation: Tensor<2>,
+) -> Tensor<1> {
+    let (points, targets) = (points.detach(), targets.detach());
+    let apart = squared_distances(&targets, &targets);
+    let itself = apart.clone().lower_equal_elem(1e-8); // the point, and copies of it
+    let apart = apart.mask_fill(itself, f32::MAX).min_dim(2); // [batch, m, 1]
+    let spacing = apart.clamp(1e-6, 1.0).mean_dim(1); // squared, [batch, 1, 1]
+    let scaled = squared_distances(&transform(points, true_rotation, true_translation), &targets) / spacing;
+    let weights = (scaled.clone().min_dim(2) * -0.5).exp(); // [batch, n, 1]
+    let labels = softmax(scaled * -2.0, 2); // standard deviation: half the spacing
+    let log = |p: Tensor<3>| (p + 1e-9).log();
+    let divergence = (labels.clone() * (log(labels) - log(probabilities))).sum_dim(2);
+    (divergence * weights.clone()).sum() / (weights.sum() + 1e-6)
+}
+
+/// `|a_i - b_j|^2`, `[batch, n, m]`.
+fn squared_distances(a: &Tensor<3>, b: &Tensor<3>) -> Tensor<3> {
+    let square = |x: &Tensor<3>| x.clone().square().sum_dim(2);
+    let product = a.clone().matmul(b.clone().transpose());
+    (square(a) + square(b).transpose() - product * 2.0).clamp_min(0.0)
 }
 
 /// Mean distance between the soft matches and where the true pose puts the source points. Not in

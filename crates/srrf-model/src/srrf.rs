@@ -3,12 +3,14 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
+use srrf_cloud::profile::stage;
 
 use crate::branch::{Branch, BranchConfig, BranchOutput};
 use crate::geometry::HostClouds;
 use crate::integration::{Fusion, IntegrationConfig};
 use crate::layout::SrrfLayout;
 use crate::sem::{Sem, SemConfig, Skeleton};
+use crate::timing::timed;
 
 /// Sizes of the whole network.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -74,12 +76,14 @@ impl Srrf {
         target: Tensor<3>,
         phase: f32,
     ) -> SrrfOutput {
-        let both = HostClouds::read(&Tensor::cat(vec![source.clone(), target.clone()], 0));
-        let layout =
-            SrrfLayout { sem: self.sem.layout(&both), dense: self.dense.layout(&both, phase), phase };
+        let layout = stage("layout", || {
+            let both = HostClouds::read(&Tensor::cat(vec![source.clone(), target.clone()], 0));
+            SrrfLayout { sem: self.sem.layout(&both), dense: self.dense.layout(&both, phase), phase }
+        });
         let (skeletons, skeleton, dense) = self.branches(source.clone(), target.clone(), &layout);
         // (4) Integration: {R, t} = lambda {R_c, t_c} + (1 - lambda) {R_s, t_s}.
-        let fused = integration.fuse(dense.pose(), skeleton.pose(), &source, &target);
+        let fused =
+            stage("integration", || integration.fuse(dense.pose(), skeleton.pose(), &source, &target));
         let (source_skeleton, target_skeleton) = skeletons;
         SrrfOutput { source_skeleton, target_skeleton, dense, skeleton, fused }
     }
@@ -97,13 +101,14 @@ impl Srrf {
     ) -> ((Skeleton, Skeleton), BranchOutput, BranchOutput) {
         let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
         // (1) Skeletal extraction, Eq. (5) and (6).
-        let skeletons = self.sem.forward_with(clouds.clone(), &layout.sem);
+        let skeletons = timed("sem", &clouds.device(), || self.sem.forward_with(clouds.clone(), &layout.sem));
         // The gradient stop between SEM and registration.
         let stopped = skeletons.detached_points();
-        let on_skeletons = self.skeleton.layout(&HostClouds::read(&stopped), layout.phase);
+        let on_skeletons =
+            stage("skeleton layout", || self.skeleton.layout(&HostClouds::read(&stopped), layout.phase));
         // (2, 3) Features, interaction, matching and SVD: {R_s, t_s} and {R_c, t_c}.
-        let skeleton = self.skeleton.forward_with(stopped, &on_skeletons);
-        let dense = self.dense.forward_with(clouds, &layout.dense);
+        let skeleton = stage("skeleton branch", || self.skeleton.forward_with(stopped, &on_skeletons));
+        let dense = stage("dense branch", || self.dense.forward_with(clouds, &layout.dense));
         (skeletons.halves(), skeleton, dense)
     }
 }

@@ -153,6 +153,11 @@ pub struct DrawConfig {
     pub crop_keep: f64,
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the form that serde calls")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 fn one() -> f64 {
     1.0
 }
@@ -169,6 +174,9 @@ pub struct LossConfig {
     pub skeleton: SkeletonLossConfig,
     /// Weight of the correspondence loss of each branch; 0 is the paper.
     pub correspondence: f64,
+    /// Weight of the matching loss of each branch ([`srrf_model::matching_loss`]); 0 is the paper.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub matching: f64,
     /// Weight of `L_reg` of the fused pose, beside 1 for that of each branch. At 0 the integration is left
     /// out of the training step, which saves its inlier test; the branches learn from their own poses.
     #[serde(default = "one")]

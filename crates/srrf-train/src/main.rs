@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use clap::Parser;
 use srrf_baselines::{DcpConfig, EquiGsprConfig, PanetConfig, PointNetLkConfig, RgmConfig};
+use srrf_cloud::profile;
 use srrf_cloud::shapes::ProceduralShapes;
 use srrf_cloud::source::{ACCEPTED_LAYOUTS, ShapeSource, Split, open};
 use srrf_model::{SrrfConfig, keep_freed_memory};
@@ -51,6 +52,9 @@ struct Arguments {
     /// the configuration, or flex].
     #[arg(long)]
     device: Option<String>,
+    /// Print at the end what time each stage of the steps took, over all threads.
+    #[arg(long)]
+    profile: bool,
 }
 
 /// A message and an exit code: 2 for bad usage or input, 1 for a failure.
@@ -116,12 +120,18 @@ fn train<C: Trained>(arguments: Arguments) -> Result<ExitCode, Failure> {
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
         .map_err(|e| Failure(1, format!("no handler for Ctrl-C: {e}")))?;
 
+    if arguments.profile {
+        profile::start();
+    }
     tell(&format!("config {}, data {}", arguments.config.display(), shapes.description()));
     tell(&format!("run {}, device {}, {} threads", options.folder.display(), name, options.threads));
     let ended = run(&config, &options, shapes, device, &stop).map_err(|e| {
         let code = if matches!(e, RunError::Exists { .. } | RunError::Checkpoint(_)) { 2 } else { 1 };
         Failure(code, e.to_string())
     })?;
+    if profile::is_on() {
+        tell(&profile::report().to_string());
+    }
     let best = ended.best.map_or("none yet".into(), |path| path.display().to_string());
     tell(&format!("step {}, {} left out as not finite, best weights: {best}", ended.step, ended.skipped));
     if stop.load(Ordering::Relaxed) {

@@ -6,6 +6,7 @@ use burn::tensor::{Device, Tensor};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use srrf_cloud::Rigid;
+use srrf_cloud::profile::stage;
 use srrf_model::geometry::HostClouds;
 use srrf_model::weights::WeightsError;
 use srrf_model::{NetworkConfig, PairBatch};
@@ -101,7 +102,8 @@ impl Terms {
         if let Some(total) = self.total {
             names.push("total");
             values.push(total.clone().detach());
-            gradients = GradientsParams::from_grads(total.backward(), network);
+            gradients =
+                stage("backward", || GradientsParams::from_grads(total.backward(), network));
         }
         // Read last and at once: a device that works ahead would have to stop for each.
         let values = Tensor::cat(values, 0).try_to_vec_as::<f64>().unwrap_or_default();

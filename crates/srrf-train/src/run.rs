@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use burn::module::Module;
 use burn::tensor::Device;
+use srrf_cloud::profile;
 use srrf_cloud::source::ShapeSource;
 use srrf_corrupt::{Pair, Severity};
 use srrf_model::weights::{parameters, to_safetensors, with_parameters, write_atomically};
@@ -318,7 +319,8 @@ impl<'a, C: Trained> Run<'a, C> {
         if clip > 0.0 && outcome.norm > clip {
             outcome.gradients.scale(clip / outcome.norm);
         }
-        self.model = self.updater.step(rate, self.model.clone(), outcome.gradients);
+        let model = self.model.clone();
+        self.model = profile::stage("optimizer", || self.updater.step(rate, model, outcome.gradients));
         outcome.losses.insert("gradient_norm", outcome.norm);
         Ok(outcome.losses)
     }

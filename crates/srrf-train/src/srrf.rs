@@ -8,7 +8,7 @@ use srrf_model::geometry::HostClouds;
 use srrf_model::weights::WeightsError;
 use srrf_model::{
     BranchOutput, SemLayout, Skeleton, Srrf, SrrfConfig, SrrfLayout, chamfer, correspondence_loss, embedded,
-    registration_loss, skeleton_loss, spread, transform,
+    matching_loss, registration_loss, skeleton_loss, spread, transform,
 };
 
 use crate::config::{LossConfig, SemTraining, StageConfig};
@@ -62,7 +62,7 @@ impl Trained for SrrfConfig {
             Layout::Whole(layout) => {
                 let (skeletons, skeleton, dense) = fork.branches(source.clone(), target.clone(), &layout);
                 for (names, branch) in [(DENSE, &dense), (SKELETON, &skeleton)] {
-                    branch_terms(&mut terms, names, branch, losses.correspondence, &rotation, &translation);
+                    branch_terms(&mut terms, names, branch, losses, &rotation, &translation);
                 }
                 if losses.fused > 0.0 {
                     let fused = self.integration.fuse(dense.pose(), skeleton.pose(), &source, &target);
@@ -116,15 +116,15 @@ pub enum Layout {
     Skeletons(SemLayout),
 }
 
-const DENSE: [&str; 2] = ["dense", "dense_correspondence"];
-const SKELETON: [&str; 2] = ["skeleton", "skeleton_correspondence"];
+const DENSE: [&str; 3] = ["dense", "dense_correspondence", "dense_matching"];
+const SKELETON: [&str; 3] = ["skeleton", "skeleton_correspondence", "skeleton_matching"];
 
-/// `L_reg` of a branch and its correspondence loss.
+/// `L_reg` of a branch, its correspondence loss and its matching loss.
 fn branch_terms(
     terms: &mut Terms,
-    [name, correspondence]: [&'static str; 2],
+    [name, correspondence, matching]: [&'static str; 3],
     branch: &BranchOutput,
-    weight: f64,
+    losses: &LossConfig,
     rotation: &Tensor<3>,
     translation: &Tensor<2>,
 ) {
@@ -133,9 +133,14 @@ fn branch_terms(
     let (points, matches) = (branch.source_points.clone(), branch.matches.clone());
     terms.add(
         correspondence,
-        correspondence_loss(points, matches, rotation.clone(), translation.clone()),
-        weight,
+        correspondence_loss(points.clone(), matches, rotation.clone(), translation.clone()),
+        losses.correspondence,
     );
+    if losses.matching > 0.0 {
+        let (probabilities, targets) = (branch.probabilities.clone(), branch.target_points.clone());
+        let (r, t) = (rotation.clone(), translation.clone());
+        terms.add(matching, matching_loss(probabilities, points, targets, r, t), losses.matching);
+    }
 }
 
 /// The losses of the skeleton module.

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use burn::tensor::Device;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use srrf_cloud::{PointCloud, Rigid};
+use srrf_cloud::{PointCloud, Rigid, profile};
 use srrf_corrupt::Pair;
 use srrf_model::{HostPairs, SrrfConfig};
 
@@ -58,10 +58,10 @@ pub fn prepare<C: Trained>(
 ) -> Result<Prepared<C::Layout>, StepError> {
     let count = config.optimizer.shard;
     let first = number * count;
-    let pairs = pairs.shard(first, count)?;
+    let pairs = profile::stage("pairs", || pairs.shard(first, count))?;
     let phase = ChaCha8Rng::seed_from_u64(first as u64).random::<f32>();
     let (pairs, poses) = host_pairs(&pairs).ok_or(StepError::Ragged(first))?;
-    let layout = config.network.layout(stage, &pairs.clouds, phase);
+    let layout = profile::stage("layout", || config.network.layout(stage, &pairs.clouds, phase));
     Ok(Prepared { pairs, poses, phase, layout })
 }
 
@@ -195,6 +195,8 @@ fn shard<C: Trained>(
     };
     let Prepared { pairs, poses, phase, layout } = prepared?;
     let shard = upload(&pairs, &poses, phase, device);
-    let (gradients, losses) = config.network.gradient(&config.losses, stage, network, shard, layout);
+    let (gradients, losses) = profile::stage("network", || {
+        config.network.gradient(&config.losses, stage, network, shard, layout)
+    });
     Ok((RowGradients::new(gradients, network), losses))
 }

@@ -22,6 +22,7 @@ mod thresholds;
 mod write;
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 pub use options::TablesOptions;
 
@@ -33,7 +34,7 @@ use crate::run::{Outcome, Run};
 use crate::summary::Summary;
 use crate::synthesized::{Protocol, SynthesizedPairs};
 use crate::{EvalError, data};
-use cast::{Cast, model_or};
+use cast::Cast;
 use sampling::SampledPairs;
 
 /// Built-in shapes that are scored without data.
@@ -147,13 +148,20 @@ impl Stage<'_> {
         let options = self.options;
         let main = plan::main_protocol(options, self.shapes);
         let middle = Protocol { severities: vec![plan::MIDDLE], ..main.clone() };
-        let no_ddl = model_or(options.no_ddl_weights.as_deref(), "srrf-no-ddl");
-        let no_ddl = no_ddl.map(|path| ("srrf".to_owned(), path)).into_iter().collect();
+        let of_srrf = |weights: Option<PathBuf>| -> BTreeMap<String, PathBuf> {
+            weights.map(|path| ("srrf".to_owned(), path)).into_iter().collect()
+        };
+        let (ddl, no_ddl) = (of_srrf(options.with_loss()), of_srrf(options.without_loss()));
+        let clean = options.clean_models();
         let wanted = [
-            ("clean-trained", "models trained clean", options.clean_models(), main, "--clean-weights"),
-            ("table5", "skeletons without the loss", no_ddl, middle, "--no-ddl-weights"),
+            ("clean-trained", "clean-trained", "models trained clean", clean, main, "--clean-weights"),
+            ("table5", "with-loss", "skeletons with the loss", ddl, middle.clone(), "--ddl-weights"),
+            ("table5", "without-loss", "skeletons without the loss", no_ddl, middle, "--no-ddl-weights"),
         ];
-        for (key, title, weights, protocol, switch) in wanted.into_iter().filter(|w| options.wants(w.0)) {
+        for (part, key, title, weights, protocol, switch) in wanted {
+            if !options.wants(part) || (key == "with-loss" && weights.is_empty()) {
+                continue; // without weights of their own, table 5 takes those of the main tables
+            }
             if weights.is_empty() {
                 let reason = format!("no such weights are in the program; give a file with {switch}");
                 evidence.missing.push((title.to_owned(), reason));

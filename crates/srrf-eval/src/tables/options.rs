@@ -45,8 +45,13 @@ pub struct TablesOptions {
     #[arg(long, value_name = "PATH")]
     pub clean_weights: Vec<String>,
 
-    /// Weights that were trained without the distribution distance loss, for table 5 [default:
-    /// srrf-no-ddl, if the program has it]
+    /// Weights that were trained with the distribution distance loss, for table 5, where they are not those of
+    /// `--weights` [default: srrf-ddl, if the program has it, or the weights of srrf]
+    #[arg(long, value_name = "PATH")]
+    pub ddl_weights: Option<PathBuf>,
+
+    /// Weights that were trained without the distribution distance loss and otherwise in the same way, for table 5
+    /// [default: srrf-no-ddl, if the program has it]
     #[arg(long, value_name = "PATH")]
     pub no_ddl_weights: Option<PathBuf>,
 
@@ -119,6 +124,16 @@ impl TablesOptions {
             models.insert("srrf".to_owned(), name);
         }
         models
+    }
+
+    /// The network of table 5 that was trained with the loss; `None` for the one of `--weights`.
+    pub(crate) fn with_loss(&self) -> Option<PathBuf> {
+        model_or(self.ddl_weights.as_deref(), "srrf-ddl")
+    }
+
+    /// The network of table 5 that was trained without the loss, if there is one.
+    pub(crate) fn without_loss(&self) -> Option<PathBuf> {
+        model_or(self.no_ddl_weights.as_deref(), "srrf-no-ddl")
     }
 
     /// Whether a part is to be made.

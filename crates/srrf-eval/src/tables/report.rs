@@ -1,5 +1,7 @@
 //! The report, put together from what was measured.
 
+use std::path::PathBuf;
+
 use srrf_cloud::{PointCloud, Register};
 use srrf_corrupt::Pair;
 
@@ -158,17 +160,17 @@ fn skeleton_picture(
     pairs: &SynthesizedPairs,
     main: &Measured,
 ) -> Result<Option<super::document::Figure>, EvalError> {
-    let without = super::model_or(stage.options.no_ddl_weights.as_deref(), "srrf-no-ddl");
-    let without = without.map(|weights| {
-        let context = MethodContext::of_srrf(Some(weights), &stage.options.device);
-        super::Cast::new(&["srrf".to_owned()], &context)
-    });
-    let without = without.transpose()?;
+    let cast = |weights: Option<PathBuf>| -> Result<Option<super::Cast>, EvalError> {
+        let context = |weights| MethodContext::of_srrf(Some(weights), &stage.options.device);
+        weights.map(|weights| super::Cast::new(&["srrf".to_owned()], &context(weights))).transpose()
+    };
+    let (with, without) = (cast(stage.options.with_loss())?, cast(stage.options.without_loss())?);
     let mut networks: Vec<(&str, &dyn Register)> = Vec::new();
     if let Some(method) = without.as_ref().and_then(|cast| cast.method("srrf")) {
         networks.push(("without the loss", &*method.register));
     }
-    let Some(method) = evidence.cast.method("srrf") else { return Ok(None) };
+    let with = with.as_ref().unwrap_or(&evidence.cast).method("srrf");
+    let Some(method) = with else { return Ok(None) };
     networks.push(("with the loss", &*method.register));
     let mut shown: Vec<(String, Pair)> = Vec::new();
     for wanted in ["density_dec", "cutout", "gaussian", "background", "shear", "distortion_rbf"] {
@@ -215,9 +217,9 @@ fn sampling_section(stage: &Stage<'_>, evidence: &Evidence) -> Result<Section, E
 
 fn skeleton_section(evidence: &Evidence) -> Section {
     let mut section = Section::new("table5", "Table 5: skeletons");
-    if let Some(main) = evidence.parts.get("main") {
-        let without = evidence.parts.get("table5").map(|m| &m.summary);
-        section.sheets.extend(sheets::skeletons(&main.summary, without));
+    let of = |part: &str| evidence.parts.get(part).map(|m| &m.summary);
+    if let Some(with) = of("with-loss").or(of("main")) {
+        section.sheets.extend(sheets::skeletons(with, of("without-loss")));
     }
     section
 }

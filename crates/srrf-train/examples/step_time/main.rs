@@ -3,14 +3,12 @@
 //!
 //! ```sh
 //! cargo run -p srrf-train --example step_time -- --figure registration_step --threads 2
-//! cargo run -p srrf-train --example step_time -- --profile
 //! ```
 //!
 //! One figure a process, so that the peak memory belongs to it.
 
 mod clock;
 mod clouds;
-mod profile;
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -29,7 +27,6 @@ use srrf_train::step::{StepContext, Workers, gradient};
 
 use crate::clock::{median, memory_mib, summary, timed};
 use crate::clouds::Stored;
-use crate::profile::profile;
 
 /// Any error, across threads.
 type Failure = Box<dyn Error + Send + Sync>;
@@ -58,9 +55,6 @@ struct Arguments {
     /// Timed repetitions.
     #[arg(long, default_value_t = 10)]
     repeats: usize,
-    /// Times the stages of a shard instead, on one thread.
-    #[arg(long)]
-    profile: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -86,23 +80,18 @@ fn main() -> Result<(), Failure> {
     config.draw.independent = 0.0; // every pair has pairs.points points a cloud
     let bench = Bench::new(config, &arguments.device)?;
     let start_mib = memory_mib("VmHWM:");
-    let mut found = if arguments.profile {
-        profile(&bench, &arguments)?
-    } else {
-        let mut times = match arguments.figure {
-            Figure::RegistrationStep => bench.steps(bench.stage(true)?, &arguments)?,
-            Figure::SkeletonStep => bench.steps(bench.stage(false)?, &arguments)?,
-            Figure::Forward1 => bench.forward(1, &arguments)?,
-            Figure::Forward8 => bench.forward(8, &arguments)?,
-        };
-        times.insert("start_mib".into(), json!(start_mib));
-        times.insert("peak_mib".into(), json!(memory_mib("VmHWM:")));
-        times
+    let mut found = match arguments.figure {
+        Figure::RegistrationStep => bench.steps(bench.stage(true)?, &arguments)?,
+        Figure::SkeletonStep => bench.steps(bench.stage(false)?, &arguments)?,
+        Figure::Forward1 => bench.forward(1, &arguments)?,
+        Figure::Forward8 => bench.forward(8, &arguments)?,
     };
+    found.insert("start_mib".into(), json!(start_mib));
+    found.insert("peak_mib".into(), json!(memory_mib("VmHWM:")));
     let figure = arguments.figure.to_possible_value().map(|v| v.get_name().to_string());
-    found.insert("figure".into(), json!(if arguments.profile { Some("profile".into()) } else { figure }));
+    found.insert("figure".into(), json!(figure));
     found.insert("device".into(), json!(arguments.device));
-    found.insert("threads".into(), json!(if arguments.profile { 1 } else { arguments.threads }));
+    found.insert("threads".into(), json!(arguments.threads));
     println!("{}", Value::Object(found));
     Ok(())
 }
