@@ -13,6 +13,7 @@ cache=${XDG_CACHE_HOME:-$HOME/.cache}/srrf
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$cache/target}/backends"
 # Mesa keeps its compiled shaders here; Burn keeps autotune results as cubecl.toml says.
 export MESA_SHADER_CACHE_DIR="${MESA_SHADER_CACHE_DIR:-$cache/mesa}"
+export XDG_RUNTIME_DIR="${XDG_RUNTIME_DIR:-$cache}" # lavapipe complains where there is none
 mkdir -p "$MESA_SHADER_CACHE_DIR"
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
