@@ -80,7 +80,8 @@ pub struct Report(pub Vec<StageTime>);
 impl Report {
     /// Writes the stages inside `parent` in the order of their first call, each followed by its own.
     fn inside(&self, f: &mut fmt::Formatter<'_>, parent: &[&'static str], whole: f64) -> fmt::Result {
-        for entry in self.0.iter().filter(|e| e.path.split_last().is_some_and(|(_, around)| around == parent)) {
+        for entry in self.0.iter().filter(|e| e.path.split_last().is_some_and(|(_, around)| around == parent))
+        {
             let name = entry.path.last().copied().unwrap_or_default();
             let indent = 2 * parent.len();
             let (seconds, calls) = (entry.time.as_secs_f64(), entry.calls);

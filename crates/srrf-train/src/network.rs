@@ -102,8 +102,7 @@ impl Terms {
         if let Some(total) = self.total {
             names.push("total");
             values.push(total.clone().detach());
-            gradients =
-                stage("backward", || GradientsParams::from_grads(total.backward(), network));
+            gradients = stage("backward", || GradientsParams::from_grads(total.backward(), network));
         }
         // Read last and at once: a device that works ahead would have to stop for each.
         let values = Tensor::cat(values, 0).try_to_vec_as::<f64>().unwrap_or_default();

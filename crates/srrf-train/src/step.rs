@@ -195,8 +195,7 @@ fn shard<C: Trained>(
     };
     let Prepared { pairs, poses, phase, layout } = prepared?;
     let shard = upload(&pairs, &poses, phase, device);
-    let (gradients, losses) = profile::stage("network", || {
-        config.network.gradient(&config.losses, stage, network, shard, layout)
-    });
+    let (gradients, losses) =
+        profile::stage("network", || config.network.gradient(&config.losses, stage, network, shard, layout));
     Ok((RowGradients::new(gradients, network), losses))
 }
