@@ -43,7 +43,8 @@ pub fn matching_loss(
 ) -> Tensor<1> {
     let (points, targets) = (points.detach(), targets.detach());
     let apart = squared_distances(&targets, &targets);
-    let itself = apart.clone().lower_equal_elem(1e-8); // the point, and copies of it
+    // The point itself, and copies of it: `f32` leaves up to a few 1e-6 of their distance.
+    let itself = apart.clone().lower_equal_elem(1e-5);
     let apart = apart.mask_fill(itself, f32::MAX).min_dim(2); // [batch, m, 1]
     let spacing = apart.clamp(1e-6, 1.0).mean_dim(1); // squared, [batch, 1, 1]
     let scaled = squared_distances(&transform(points, true_rotation, true_translation), &targets) / spacing;
