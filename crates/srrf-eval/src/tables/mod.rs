@@ -22,7 +22,6 @@ mod thresholds;
 mod write;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 pub use options::TablesOptions;
 
@@ -148,9 +147,7 @@ impl Stage<'_> {
         let options = self.options;
         let main = plan::main_protocol(options, self.shapes);
         let middle = Protocol { severities: vec![plan::MIDDLE], ..main.clone() };
-        let of_srrf = |weights: Option<PathBuf>| -> BTreeMap<String, PathBuf> {
-            weights.map(|path| ("srrf".to_owned(), path)).into_iter().collect()
-        };
+        let of_srrf = |weights| MethodContext::of_srrf(weights, &options.device).weights;
         let (ddl, no_ddl) = (of_srrf(options.with_loss()), of_srrf(options.without_loss()));
         let clean = options.clean_models();
         let wanted = [

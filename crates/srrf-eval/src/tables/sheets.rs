@@ -280,19 +280,11 @@ pub(crate) fn skeletons(with: &Summary, without: Option<&Summary>) -> Option<She
             corrupted.push((a, b));
         }
     }
-    let count = corrupted.len() as f64;
-    if count > 1.0 {
-        let mean = |all: &[SkeletonAgreement]| {
-            let of = |value: fn(&SkeletonAgreement) -> f64| all.iter().map(value).sum::<f64>() / count;
-            SkeletonAgreement {
-                chamfer: of(|a| a.chamfer),
-                chamfer_sum: of(|a| a.chamfer_sum),
-                spread: of(|a| a.spread),
-            }
-        };
-        let (a, b): (Vec<_>, Vec<_>) = corrupted.into_iter().unzip();
+    let (a, b): (Vec<_>, Vec<_>) = corrupted.into_iter().unzip();
+    if let (Some(with), true) = (SkeletonAgreement::mean(&a), a.len() > 1) {
         let b: Option<Vec<_>> = b.into_iter().collect();
-        sheet.rows.push(agreement_row("mean of the corruptions", &mean(&a), b.map(|b| mean(&b)).as_ref()));
+        let without = b.and_then(|b| SkeletonAgreement::mean(&b));
+        sheet.rows.push(agreement_row("mean of the corruptions", &with, without.as_ref()));
     }
     (!sheet.rows.is_empty()).then_some(sheet)
 }

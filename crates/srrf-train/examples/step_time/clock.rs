@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use crate::{Arguments, Failure};
 
 /// Runs `job`, and gives its result and the seconds it took.
-pub fn clock<T>(job: impl FnOnce() -> T) -> (T, f64) {
+fn clock<T>(job: impl FnOnce() -> T) -> (T, f64) {
     let start = Instant::now();
     let result = job();
     (result, start.elapsed().as_secs_f64())
