@@ -88,6 +88,47 @@ fn a_checkpoint_of_another_configuration_is_refused() {
 }
 
 #[test]
+fn a_run_starts_from_parts_of_others() {
+    let scratch = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(srrf_tests::workspace().join(CONFIG)).unwrap();
+    let path = |name: &str| scratch.path().join(name).to_str().unwrap().to_string();
+    let configured = |name: &str, start: &str, seed: usize| {
+        let start = format!("seed = {seed}\n{start}");
+        std::fs::write(path(&format!("{name}.toml")), text.replacen("seed = 3", &start, 1)).unwrap();
+        [path(&format!("{name}.toml")), path(name)]
+    };
+    let begin = |[config, folder]: [String; 2]| {
+        let (code, said) =
+            run("srrf-train", &["--config", &config, "--run", &folder, "--until-step", "0"]);
+        assert_eq!(code, 0, "{said}");
+        parameters(Path::new(&folder))
+    };
+    let (a, b) = (begin(configured("a", "", 3)), begin(configured("b", "", 4)));
+    let [from_a, from_b] = ["a", "b"].map(|run| path(&format!("{run}/last.safetensors")));
+    let start = format!("start = {{ sem = \"{from_a}\", dense = \"{from_b}\" }}");
+    let mixed = begin(configured("mixed", &start, 5));
+    for (name, values) in &mixed {
+        // Weights are exported in half precision, so that the first runs' own values are near, not equal.
+        let near = |other: &[u8]| {
+            let numbers = |bytes: &[u8]| -> Vec<f32> {
+                bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
+            };
+            numbers(values).iter().zip(numbers(other)).all(|(a, b)| (a - b).abs() <= 1e-3 * b.abs() + 1e-6)
+        };
+        if name.starts_with("model.sem.") {
+            assert!(near(&a[name]), "{name}");
+        } else if name.starts_with("model.dense.") {
+            assert!(near(&b[name]), "{name}");
+        } else if name.ends_with("weight") {
+            assert!(!near(&a[name]) && !near(&b[name]), "{name}");
+        }
+    }
+    let wrong = format!("start = {{ hands = \"{from_a}\" }}");
+    let [config, folder] = configured("wrong", &wrong, 5);
+    refuses("srrf-train", &["--config", &config, "--run", &folder], &["`hands`", "does not fit", "start"]);
+}
+
+#[test]
 fn bad_configurations_are_refused_by_key() {
     let scratch = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(srrf_tests::workspace().join(CONFIG)).unwrap();

@@ -9,7 +9,7 @@ use crate::confidence::Confidence;
 use crate::geometry::{HostClouds, rows};
 use crate::integration::BranchPose;
 use crate::layout::BranchLayout;
-use crate::matching::SoftMatching;
+use crate::matching::{MatchingConfig, SoftMatching};
 use crate::pfi::{Pfi, PfiConfig};
 use crate::procrustes::{procrustes, weighted_procrustes};
 use crate::sfe::{Sfe, SfeConfig};
@@ -25,6 +25,9 @@ pub struct BranchConfig {
     /// Whether source points count in the SVD head by a learned confidence; the paper: no.
     #[serde(default)]
     pub confidence: bool,
+    /// The soft matching.
+    #[serde(default, skip_serializing_if = "MatchingConfig::is_default")]
+    pub matching: MatchingConfig,
     /// The structural feature extractor.
     pub sfe: SfeConfig,
     /// The feature interaction.
@@ -37,7 +40,7 @@ impl BranchConfig {
         Branch {
             sfe: self.sfe.init(device),
             pfi: self.pfi.init(self.sfe.output_width(), device),
-            matching: SoftMatching::new(device),
+            matching: self.matching.init(device),
             confidence: self.confidence.then(|| Confidence::new(self.sfe.output_width(), device)),
             tokens: self.tokens,
         }
@@ -69,6 +72,8 @@ pub struct BranchOutput {
     pub matches: Tensor<3>,
     /// Probability of each target point for each source point: `[batch, n, n]`.
     pub probabilities: Tensor<3>,
+    /// Probability of each source point to have a match at all, where the matching has slack: `[batch, n, 1]`.
+    pub matched: Option<Tensor<3>>,
 }
 
 impl BranchOutput {
@@ -122,12 +127,12 @@ impl Branch {
         let features = timed("pfi", &device, || self.pfi.forward(features, tokens.clone())); // Phi
         let half = |x: &Tensor<3>, which: usize| x.clone().narrow(0, which * batch, batch);
         let (source_points, target_points) = (half(&tokens, 0), half(&tokens, 1));
+        let phi = |which: usize| half(&features, which);
         let matches = timed("matching", &device, || {
-            self.matching.forward(half(&features, 0), half(&features, 1), target_points.clone())
+            self.matching.forward(phi(0), phi(1), target_points.clone())
         });
         let (rotation, translation) = timed("svd", &device, || {
-            let confidence = self.confidence.as_ref().map(|c| c.forward(half(&features, 0)));
-            match confidence {
+            match self.weights(phi(0), matches.matched.clone()) {
                 Some(weights) => weighted_procrustes(source_points.clone(), matches.points.clone(), weights),
                 None => procrustes(source_points.clone(), matches.points.clone()),
             }
@@ -139,6 +144,19 @@ impl Branch {
             target_points,
             matches: matches.points,
             probabilities: matches.probabilities,
+            matched: matches.matched,
         }
+    }
+
+    /// How much each source point counts: by its confidence and by its probability to have a match; sums to 1. None
+    /// where all count alike.
+    fn weights(&self, features: Tensor<3>, matched: Option<Tensor<3>>) -> Option<Tensor<3>> {
+        let confidence = self.confidence.as_ref().map(|c| c.forward(features));
+        let Some(matched) = matched else { return confidence };
+        let weights = match confidence {
+            Some(confidence) => confidence * matched,
+            None => matched,
+        };
+        Some(weights.clone() / (weights.sum_dim(1) + 1e-12))
     }
 }

@@ -30,12 +30,15 @@ pub fn registration_loss(
 /// RGM, DIT and others teach matches by a cross-entropy with the one true match; where the points of the two clouds
 /// do not coincide, there is none, so each source point has a label that falls off as a Gaussian around its
 /// true place, half as wide as the target points are apart. Source points with nothing near their true place
-/// (cut away, or background) count little.
+/// (cut away, or background) count little. Where the matching has slack, `matched` is taught the same weight by
+/// its binary cross-entropy, less that of the weight with itself.
 ///
 /// # Shapes
-/// - `probabilities`: `[batch, n, m]`, `points`: `[batch, n, 3]`, `targets`: `[batch, m, 3]`, output `[1]`
+/// - `probabilities`: `[batch, n, m]`, `matched`: `[batch, n, 1]`, `points`: `[batch, n, 3]`, `targets`:
+///   `[batch, m, 3]`, output `[1]`
 pub fn matching_loss(
     probabilities: Tensor<3>,
+    matched: Option<Tensor<3>>,
     points: Tensor<3>,
     targets: Tensor<3>,
     true_rotation: Tensor<3>,
@@ -52,7 +55,11 @@ pub fn matching_loss(
     let labels = softmax(scaled * -2.0, 2); // standard deviation: half the spacing
     let log = |p: Tensor<3>| (p + 1e-9).log();
     let divergence = (labels.clone() * (log(labels) - log(probabilities))).sum_dim(2);
-    (divergence * weights.clone()).sum() / (weights.sum() + 1e-6)
+    let rows = (divergence * weights.clone()).sum() / (weights.clone().sum() + 1e-6);
+    let Some(matched) = matched else { return rows };
+    let against = |p: Tensor<3>, q: Tensor<3>| p.clone() * (log(p) - log(q));
+    let none = against(weights.clone().neg() + 1.0, matched.clone().neg() + 1.0);
+    rows + (against(weights, matched) + none).mean()
 }
 
 /// `|a_i - b_j|^2`, `[batch, n, m]`.

@@ -72,9 +72,14 @@ impl Case {
     }
 
     fn loss(&self, probabilities: Tensor<3>) -> Tensor<1> {
+        self.loss_with(probabilities, None)
+    }
+
+    fn loss_with(&self, probabilities: Tensor<3>, matched: Option<Tensor<3>>) -> Tensor<1> {
         let device = Device::flex();
         matching_loss(
             probabilities,
+            matched,
             tensor(&self.points, [BATCH, SOURCES, 3], &device),
             tensor(&self.targets, [BATCH, TARGETS, 3], &device),
             tensor(&self.rotation, [BATCH, 3, 3], &device),
@@ -106,6 +111,25 @@ fn it_is_zero_at_the_labels_alone() {
     assert!(at_labels.abs() < 1e-5, "{at_labels}"); // f32 labels
     let even = vec![1.0 / TARGETS as f64; labels.len()];
     assert!(values(&case.loss(tensor(&even, [BATCH, SOURCES, TARGETS], &Device::flex())))[0] > 0.1);
+}
+
+#[test]
+fn slack_learns_which_points_have_a_match() {
+    let case = case();
+    let device = Device::flex();
+    let even = tensor(&vec![1.0 / TARGETS as f64; BATCH * SOURCES * TARGETS], [BATCH, SOURCES, TARGETS], &device);
+    let weights: Vec<f64> = case.labels().into_iter().map(|(_, weight)| weight).collect();
+    let with = |matched: &[f64]| {
+        let matched = tensor(matched, [BATCH, SOURCES, 1], &device);
+        values(&case.loss_with(even.clone(), Some(matched)))[0] - values(&case.loss(even.clone()))[0]
+    };
+    assert!(with(&weights).abs() < 1e-5, "nothing to learn at the weights: {}", with(&weights));
+    let matched: Vec<f64> = Numbers(6).many(weights.len()).iter().map(|v| 0.5 + 0.4 * v).collect();
+    let divergence = |q: f64, p: f64| if q > 0.0 { q * (q / p).ln() } else { 0.0 };
+    let pairs = weights.iter().zip(&matched);
+    let wanted = pairs.map(|(w, p)| divergence(*w, *p) + divergence(1.0 - w, 1.0 - p)).sum::<f64>();
+    let wanted = wanted / weights.len() as f64;
+    assert!(wanted > 0.01 && (with(&matched) - wanted).abs() < 1e-4 * wanted, "{} {wanted}", with(&matched));
 }
 
 #[test]

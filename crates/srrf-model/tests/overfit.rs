@@ -10,7 +10,7 @@ use common::Numbers;
 use nalgebra::Vector3;
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_model::{
-    BranchConfig, BranchOutput, InlierTest, IntegrationConfig, LevelConfig, PairBatch, PfiConfig, SemConfig,
+    BranchConfig, BranchOutput, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PairBatch, PfiConfig, SemConfig,
     SfeConfig, SkeletonLossConfig, Srrf, SrrfConfig, chamfer, correspondence_loss, init, registration_loss,
     skeleton_loss,
 };
@@ -30,8 +30,8 @@ fn config() -> SrrfConfig {
             skeleton_points: 24,
             logit_scale: 5.0,
         },
-        dense: BranchConfig { tokens: 48, confidence: false, sfe: sfe(8), pfi: pfi.clone() },
-        skeleton: BranchConfig { tokens: 0, confidence: true, sfe: sfe(6), pfi },
+        dense: BranchConfig { tokens: 48, confidence: false, matching: MatchingConfig::default(), sfe: sfe(8), pfi: pfi.clone() },
+        skeleton: BranchConfig { tokens: 0, confidence: true, matching: MatchingConfig::default(), sfe: sfe(6), pfi },
         integration: IntegrationConfig {
             test: InlierTest::Nearest,
             dense_threshold: 0.05,

@@ -1,6 +1,7 @@
 //! The typed configuration of a training run: one TOML file, unknown keys are errors, values are
 //! checked, and the resolved configuration is saved beside every result.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -53,10 +54,9 @@ pub struct TrainConfig<C: Trained = SrrfConfig> {
     pub name: String,
     /// Seed of the initial weights and of every draw.
     pub seed: u64,
-    /// Weights to start from: a file, or the name of a model in the program; random if not given.
-    /// Their network must have the sizes of this one.
+    /// Weights to start from; random if not given. What they hold must have the sizes of this network.
     #[serde(default)]
-    pub start: Option<String>,
+    pub start: Option<StartConfig>,
     /// Where the network runs (`flex`, `ndarray`, `wgpu`, `vulkan`, `cuda`, `libtorch`); `--device` comes before
     /// it, and `flex` is used if neither is given. A run may go on on another device.
     #[serde(default)]
@@ -79,6 +79,16 @@ pub struct TrainConfig<C: Trained = SrrfConfig> {
     /// Validation and checkpoints.
     #[serde(default)]
     pub keep: KeepConfig,
+}
+
+/// Weights to start from: files, or names of models in the program.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum StartConfig {
+    /// All of a network.
+    Whole(String),
+    /// Its parts by name (`sem`, `dense`, `skeleton`), each from its own. Others are random.
+    Parts(BTreeMap<String, String>),
 }
 
 /// The shapes that pairs are made from.

@@ -16,7 +16,7 @@ use srrf_model::{init, is_accelerator};
 
 use crate::ahead::{Ahead, Closing};
 use crate::checkpoint::{self, CheckpointError, Progress};
-use crate::config::{DataSource, TrainConfig};
+use crate::config::{DataSource, StartConfig, TrainConfig};
 use crate::data::TrainingPairs;
 use crate::log::{Log, progress_bar, summary};
 use crate::network::Trained;
@@ -393,23 +393,36 @@ impl<'a, C: Trained> Run<'a, C> {
     }
 }
 
-/// The weights that `start` of the configuration names.
+/// The weights that `start` of the configuration names. Parameters that only this network has keep their
+/// initial values.
 fn starting_model<C: Trained>(
-    start: &str,
+    start: &StartConfig,
     config: &TrainConfig<C>,
     device: &Device,
 ) -> Result<C::Network, RunError> {
-    let loaded = C::start(start, device)?;
-    // Parameters that only this network has keep their initial values.
     let fresh = init::seeded(config.network.init(device), config.seed);
     let mut values = parameters(&fresh);
-    for (name, theirs) in parameters(&loaded) {
-        match values.get_mut(&name) {
-            Some(ours) if ours.0 == theirs.0 => *ours = theirs,
-            _ => return Err(RunError::Start { start: start.to_string(), name }),
+    let parts: Vec<(&str, &String)> = match start {
+        StartConfig::Whole(start) => vec![("", start)],
+        StartConfig::Parts(parts) => parts.iter().map(|(part, start)| (part.as_str(), start)).collect(),
+    };
+    for (part, start) in parts {
+        let wrong = |name: String| RunError::Start { start: start.clone(), name };
+        let within = |name: &String| part.is_empty() || name.split('.').next() == Some(part);
+        let theirs: Vec<_> =
+            parameters(&C::start(start, device)?).into_iter().filter(|(name, _)| within(name)).collect();
+        if theirs.is_empty() {
+            return Err(wrong(part.to_string()));
+        }
+        for (name, theirs) in theirs {
+            match values.get_mut(&name) {
+                Some(ours) if ours.0 == theirs.0 => *ours = theirs,
+                _ => return Err(wrong(name)),
+            }
         }
     }
-    with_parameters(fresh, values).map_err(|(name, _)| RunError::Start { start: start.to_string(), name })
+    let start = || format!("{start:?}");
+    with_parameters(fresh, values).map_err(|(name, _)| RunError::Start { start: start(), name })
 }
 
 fn merge((sums, count): &mut (Losses, usize), losses: Losses) {

@@ -137,9 +137,9 @@ fn branch_terms(
         losses.correspondence,
     );
     if losses.matching > 0.0 {
-        let (probabilities, targets) = (branch.probabilities.clone(), branch.target_points.clone());
-        let (r, t) = (rotation.clone(), translation.clone());
-        terms.add(matching, matching_loss(probabilities, points, targets, r, t), losses.matching);
+        let (probabilities, matched) = (branch.probabilities.clone(), branch.matched.clone());
+        let (targets, r, t) = (branch.target_points.clone(), rotation.clone(), translation.clone());
+        terms.add(matching, matching_loss(probabilities, matched, points, targets, r, t), losses.matching);
     }
 }
 

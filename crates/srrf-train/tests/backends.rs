@@ -20,7 +20,7 @@ use burn::optim::GradientsParams;
 use burn::tensor::{DType, Device, Tensor};
 use srrf_cloud::shapes::ProceduralShapes;
 use srrf_model::weights::parameters;
-use srrf_model::{Srrf, correspondence_loss, init, registration_loss, skeleton_loss};
+use srrf_model::{MatchingConfig, Srrf, correspondence_loss, init, registration_loss, skeleton_loss};
 use srrf_train::config::TrainConfig;
 use srrf_train::data::TrainingPairs;
 use srrf_train::network::Shard;
@@ -46,6 +46,9 @@ fn config() -> TrainConfig {
     let mut config = <TrainConfig>::read(&path).unwrap();
     config.draw.independent = 0.0;
     (config.optimizer.batch, config.optimizer.shard) = (4, 2);
+    // One branch as the paper has it, the other with all that the matching can do.
+    config.network.dense.matching = MatchingConfig { normalise: true, sinkhorn: 3 };
+    config.losses.matching = 0.5;
     config
 }
 

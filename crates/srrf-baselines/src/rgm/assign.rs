@@ -1,36 +1,19 @@
 //! Assignments: Sinkhorn with slack, and the Hungarian method.
 
 use burn::tensor::{Tensor, TensorData};
+use srrf_model::Scaled;
 use srrf_model::geometry::rows;
 
-use crate::se3::constant;
-
-/// Scores beyond this are cut: `e^30` squared fits `f32`.
-const MOST: f64 = 30.0;
 /// A node whose row or column sums to less has no match.
 const LEAST_SUM: f64 = 0.5;
 
-/// Sinkhorn with a slack row and column of score 0, which take what has no match: rows and columns of the
-/// others are brought to sum 1 in turn, slack included.
-///
-/// The matrix is `u_i K_ij v_j` with `K = exp(scores)` all the time, so two vectors are iterated, which
-/// costs a product of matrix and vector each, where the form with logarithms costs a pass of `exp` and
-/// `log` over the matrix. The values are the same.
+/// The assignment by [`srrf_model::sinkhorn`].
 ///
 /// # Shapes
 /// - `scores`: `[batch, n, m]`, output: `[batch, n, m]`, without the slack
 pub(super) fn sinkhorn(scores: Tensor<3>, iterations: usize) -> Tensor<3> {
-    let [batch, n, m] = scores.dims();
-    let kernel = scores.clamp(-MOST, MOST).exp();
-    let transposed = kernel.clone().transpose();
-    let ones = |count: usize| constant(&vec![1.0; count], [1, count, 1], &kernel).repeat_dim(0, batch);
-    // Slack entries of the kernel are 1, and so are the factors of the slack row and column.
-    let (mut u, mut v) = (ones(n), ones(m));
-    for _ in 0..iterations {
-        u = (kernel.clone().matmul(v.clone()) + 1.0).recip();
-        v = (transposed.clone().matmul(u.clone()) + 1.0).recip();
-    }
-    kernel * u * v.transpose()
+    let Scaled { kernel, rows, columns } = srrf_model::sinkhorn(scores, iterations);
+    kernel * rows * columns.transpose()
 }
 
 /// The match of each source point by the Hungarian method, and its weight: the assignment's entry, 0 for

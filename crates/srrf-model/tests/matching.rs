@@ -1,0 +1,116 @@
+//! Soft matching beyond the paper: normalised scores, and slack by Sinkhorn.
+
+mod common;
+
+use burn::tensor::{Device, Tensor};
+use common::{Numbers, difference, tensor, tensor64, values};
+use srrf_model::{MatchingConfig, Scaled, SoftMatching, init, sinkhorn};
+
+const CLOUDS: usize = 3;
+const SOURCES: usize = 5;
+const TARGETS: usize = 7;
+const WIDTH: usize = 11;
+const BOTH: MatchingConfig = MatchingConfig { normalise: true, sinkhorn: 4 };
+
+fn matching(config: &MatchingConfig) -> SoftMatching {
+    init::seeded(config.init(&Device::flex()), 1)
+}
+
+fn features(seed: u64, points: usize) -> Vec<f64> {
+    Numbers(seed).many(CLOUDS * points * WIDTH)
+}
+
+fn targets() -> Vec<f64> {
+    Numbers(3).many(CLOUDS * TARGETS * 3)
+}
+
+#[test]
+fn sinkhorn_agrees_with_the_form_in_logarithms() {
+    let (n, m) = (SOURCES, TARGETS);
+    let scores: Vec<f64> = Numbers(4).many(n * m).iter().map(|v| 4.0 * v).collect();
+    let Scaled { kernel, rows, columns } = sinkhorn(tensor64(&scores, [1, n, m], &Device::flex()), 20);
+    let found = values(&(kernel * rows * columns.transpose()));
+    let mut log = vec![vec![0.0; m + 1]; n + 1];
+    (0..n * m).for_each(|i| log[i / m][i % m] = scores[i]);
+    for _ in 0..20 {
+        for row in log.iter_mut().take(n) {
+            let sum = row.iter().map(|v: &f64| v.exp()).sum::<f64>().ln();
+            row.iter_mut().for_each(|v| *v -= sum);
+        }
+        for j in 0..m {
+            let sum = log.iter().map(|row| row[j].exp()).sum::<f64>().ln();
+            log.iter_mut().for_each(|row| row[j] -= sum);
+        }
+    }
+    let wanted: Vec<f64> = (0..n * m).map(|i| log[i / m][i % m].exp()).collect();
+    assert!(difference(&found, &wanted) < 1e-12);
+}
+
+#[test]
+fn normalised_scores_do_not_know_how_long_features_are() {
+    let found = |scale: f64| {
+        let scaled = |seed: u64, n: usize| -> Tensor<3> {
+            tensor(&features(seed, n), [CLOUDS, n, WIDTH], &Device::flex()) * scale
+        };
+        let config = MatchingConfig { normalise: true, ..MatchingConfig::default() };
+        let y = tensor(&targets(), [CLOUDS, TARGETS, 3], &Device::flex());
+        let found = matching(&config).forward(scaled(1, SOURCES), scaled(2, TARGETS), y);
+        assert!(found.matched.is_none());
+        values(&found.points)
+    };
+    assert!(difference(&found(1.0), &found(30.0)) < 1e-5);
+}
+
+#[test]
+fn slack_takes_what_has_no_match() {
+    // Source i looks like target i, but for the last one, which looks like nothing.
+    let (n, m) = (SOURCES, TARGETS);
+    let one_hot = |row: usize, column: usize| f64::from(row == column && row + 1 < n);
+    let x: Vec<f64> = (0..CLOUDS * n * WIDTH).map(|i| one_hot(i / WIDTH % n, i % WIDTH)).collect();
+    let y: Vec<f64> = (0..CLOUDS * m * WIDTH).map(|i| one_hot(i / WIDTH % m, i % WIDTH)).collect();
+    let found = matching(&BOTH).forward(
+        tensor(&x, [CLOUDS, n, WIDTH], &Device::flex()),
+        tensor(&y, [CLOUDS, m, WIDTH], &Device::flex()),
+        tensor(&targets(), [CLOUDS, m, 3], &Device::flex()),
+    );
+    let matched = found.matched.as_ref().map(values).unwrap_or_default();
+    for of_cloud in matched.chunks_exact(n) {
+        let (last, others) = of_cloud.split_last().unwrap();
+        assert!(*last < 0.3 && others.iter().all(|p| *p > 0.7 && *p < 1.0), "{of_cloud:?}");
+    }
+    for (i, row) in values(&found.probabilities).chunks_exact(m).enumerate() {
+        assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-5);
+        assert!(i % n + 1 == n || row[i % n] > 0.7);
+    }
+    let expected = found.probabilities.matmul(tensor(&targets(), [CLOUDS, m, 3], &Device::flex()));
+    assert!(difference(&values(&expected), &values(&found.points)) < 1e-6);
+}
+
+#[test]
+fn gradients_are_those_of_finite_differences() {
+    let device = Device::flex().autodiff();
+    let (x, y) = (features(1, SOURCES), features(2, TARGETS));
+    let weights = Numbers(5).many(CLOUDS * SOURCES * 4);
+    let loss = |x: Tensor<3>| {
+        let device = x.device();
+        let config = BOTH.init(&device);
+        let y = tensor64(&y, [CLOUDS, TARGETS, WIDTH], &device);
+        let points = tensor64(&targets(), [CLOUDS, TARGETS, 3], &device);
+        let found = config.forward(x, y, points);
+        let both = Tensor::cat(found.matched.into_iter().chain([found.points]).collect(), 2);
+        (both * tensor64(&weights, [CLOUDS, SOURCES, 4], &device)).sum()
+    };
+    let at = |x: &[f64], device: &Device| tensor64(x, [CLOUDS, SOURCES, WIDTH], device);
+    let input = at(&x, &device).require_grad();
+    let gradient = values(&input.grad(&loss(input.clone()).backward()).unwrap());
+    assert!(gradient.iter().any(|g| g.abs() > 1e-2));
+    for i in (0..x.len()).step_by(7) {
+        let moved = |by: f64| {
+            let mut x = x.clone();
+            x[i] += by;
+            values(&loss(at(&x, &Device::flex())))[0]
+        };
+        let wanted = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+        assert!((gradient[i] - wanted).abs() < 1e-6, "{i}: {} {wanted}", gradient[i]);
+    }
+}
