@@ -98,8 +98,7 @@ fn a_run_starts_from_parts_of_others() {
         [path(&format!("{name}.toml")), path(name)]
     };
     let begin = |[config, folder]: [String; 2]| {
-        let (code, said) =
-            run("srrf-train", &["--config", &config, "--run", &folder, "--until-step", "0"]);
+        let (code, said) = run("srrf-train", &["--config", &config, "--run", &folder, "--until-step", "0"]);
         assert_eq!(code, 0, "{said}");
         parameters(Path::new(&folder))
     };

@@ -128,15 +128,13 @@ impl Branch {
         let half = |x: &Tensor<3>, which: usize| x.clone().narrow(0, which * batch, batch);
         let (source_points, target_points) = (half(&tokens, 0), half(&tokens, 1));
         let phi = |which: usize| half(&features, which);
-        let matches = timed("matching", &device, || {
-            self.matching.forward(phi(0), phi(1), target_points.clone())
-        });
-        let (rotation, translation) = timed("svd", &device, || {
-            match self.weights(phi(0), matches.matched.clone()) {
+        let matches =
+            timed("matching", &device, || self.matching.forward(phi(0), phi(1), target_points.clone()));
+        let (rotation, translation) =
+            timed("svd", &device, || match self.weights(phi(0), matches.matched.clone()) {
                 Some(weights) => weighted_procrustes(source_points.clone(), matches.points.clone(), weights),
                 None => procrustes(source_points.clone(), matches.points.clone()),
-            }
-        });
+            });
         BranchOutput {
             rotation,
             translation,

@@ -14,6 +14,13 @@ const EMBEDDED: &[(&str, &[u8])] = &[
     ("srrf-shapes", include_bytes!("../weights/srrf-shapes.safetensors")),
 ];
 
+/// Embedded networks that are no models to register with: two skeleton modules, trained with and without the
+/// distribution distance loss, for the comparison of the two.
+const ABLATIONS: &[(&str, &[u8])] = &[
+    ("srrf-ddl", include_bytes!("../weights/srrf-ddl.safetensors")),
+    ("srrf-no-ddl", include_bytes!("../weights/srrf-no-ddl.safetensors")),
+];
+
 /// Names of the embedded models, the default first.
 pub fn names() -> impl Iterator<Item = &'static str> {
     EMBEDDED.iter().map(|(name, _)| *name)
@@ -21,10 +28,10 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 
 /// An embedded model by name: `srrf-small` (trained on ModelNet40, the default), `srrf` (the full-size one,
 /// trained on the same shapes on a GPU) or `srrf-shapes` (trained on the built-in shapes). `None` if there
-/// is no model of that name. What `srrf-small` was trained from lies beside it as files, `srrf-small-start`
-/// and `srrf-small-2`.
+/// is no model of that name. What they were trained from lies beside them as files, `srrf-small-start`, `srrf-small-2`
+/// and `srrf-start`. `srrf-ddl` and `srrf-no-ddl` are two skeleton modules to compare, whose branches are untrained.
 pub fn load(name: &str, device: &Device) -> Option<Result<LoadedModel, WeightsError>> {
-    let (name, bytes) = EMBEDDED.iter().find(|(known, _)| *known == name)?;
+    let (name, bytes) = EMBEDDED.iter().chain(ABLATIONS).find(|(known, _)| *known == name)?;
     Some(from_safetensors(bytes, &format!("embedded weights {name}"), device))
 }
 
@@ -64,6 +71,9 @@ mod tests {
             assert_eq!(load(name, &device).unwrap().unwrap().name, name);
         }
         assert_eq!(names().count(), 3);
+        for (name, _) in ABLATIONS {
+            assert!(load(name, &device).unwrap().is_ok(), "{name}");
+        }
         assert!(load("srrf-large", &device).is_none());
         assert_eq!(open("srrf-shapes", &device).unwrap().name, "srrf-shapes");
         let unknown = open("srrf-large", &device).unwrap_err().to_string();

@@ -97,7 +97,11 @@ impl SoftMatching {
         let total = mass.clone().sum_dim(2);
         let probabilities = mass / (total.clone() + 1e-12);
         let matched = total.clone() / (total + 1.0); // 1 - u
-        SoftMatches { points: probabilities.clone().matmul(target_points), probabilities, matched: Some(matched) }
+        SoftMatches {
+            points: probabilities.clone().matmul(target_points),
+            probabilities,
+            matched: Some(matched),
+        }
     }
 
     /// `[batch, n, m]`.
@@ -148,9 +152,8 @@ pub fn sinkhorn(scores: Tensor<3>, iterations: usize) -> Scaled {
     let [batch, n, m] = scores.dims();
     let kernel = scores.clamp(-MOST, MOST).exp();
     let transposed = kernel.clone().transpose();
-    let ones = |count: usize| {
-        Tensor::ones([batch, count, 1], (&kernel.device().without_autodiff(), kernel.dtype()))
-    };
+    let ones =
+        |count: usize| Tensor::ones([batch, count, 1], (&kernel.device().without_autodiff(), kernel.dtype()));
     let (mut rows, mut columns) = (ones(n), ones(m));
     for _ in 0..iterations {
         rows = (kernel.clone().matmul(columns.clone()) + 1.0).recip();

@@ -117,7 +117,8 @@ fn it_is_zero_at_the_labels_alone() {
 fn slack_learns_which_points_have_a_match() {
     let case = case();
     let device = Device::flex();
-    let even = tensor(&vec![1.0 / TARGETS as f64; BATCH * SOURCES * TARGETS], [BATCH, SOURCES, TARGETS], &device);
+    let even =
+        tensor(&vec![1.0 / TARGETS as f64; BATCH * SOURCES * TARGETS], [BATCH, SOURCES, TARGETS], &device);
     let weights: Vec<f64> = case.labels().into_iter().map(|(_, weight)| weight).collect();
     let with = |matched: &[f64]| {
         let matched = tensor(matched, [BATCH, SOURCES, 1], &device);

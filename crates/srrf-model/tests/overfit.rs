@@ -10,9 +10,9 @@ use common::Numbers;
 use nalgebra::Vector3;
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_model::{
-    BranchConfig, BranchOutput, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PairBatch, PfiConfig, SemConfig,
-    SfeConfig, SkeletonLossConfig, Srrf, SrrfConfig, chamfer, correspondence_loss, init, registration_loss,
-    skeleton_loss,
+    BranchConfig, BranchOutput, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PairBatch,
+    PfiConfig, SemConfig, SfeConfig, SkeletonLossConfig, Srrf, SrrfConfig, chamfer, correspondence_loss,
+    init, registration_loss, skeleton_loss,
 };
 
 const PAIRS: usize = 8;
@@ -30,8 +30,20 @@ fn config() -> SrrfConfig {
             skeleton_points: 24,
             logit_scale: 5.0,
         },
-        dense: BranchConfig { tokens: 48, confidence: false, matching: MatchingConfig::default(), sfe: sfe(8), pfi: pfi.clone() },
-        skeleton: BranchConfig { tokens: 0, confidence: true, matching: MatchingConfig::default(), sfe: sfe(6), pfi },
+        dense: BranchConfig {
+            tokens: 48,
+            confidence: false,
+            matching: MatchingConfig::default(),
+            sfe: sfe(8),
+            pfi: pfi.clone(),
+        },
+        skeleton: BranchConfig {
+            tokens: 0,
+            confidence: true,
+            matching: MatchingConfig::default(),
+            sfe: sfe(6),
+            pfi,
+        },
         integration: IntegrationConfig {
             test: InlierTest::Nearest,
             dense_threshold: 0.05,

@@ -38,23 +38,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (nearest, both, soft) = (InlierTest::Nearest, InlierTest::BothWays, InlierTest::SoftMatch);
     for (passes, tokens, test, threshold, skeleton_threshold, sharpness) in [
         (1, 256, nearest, 0.05, 0.05, 1.0),
-        (1, 256, nearest, 0.05, 0.05, 16.0),
-        (2, 256, nearest, 0.05, 0.05, 1.0),
-        (2, 256, nearest, 0.05, 0.05, 16.0),
-        (2, 256, nearest, 0.05, 0.05, 64.0),
-        (2, 256, nearest, 0.03, 0.03, 16.0),
-        (2, 256, nearest, 0.02, 0.02, 16.0),
-        (2, 256, nearest, 0.08, 0.08, 16.0),
-        (2, 256, soft, 0.05, 0.1, 1.0),
-        (3, 256, nearest, 0.05, 0.05, 16.0),
-        (2, 256, both, 0.05, 0.05, 4.0),
-        (2, 256, both, 0.05, 0.05, 16.0),
-        (2, 256, both, 0.05, 0.05, 64.0),
-        (2, 512, nearest, 0.05, 0.05, 16.0),
+        (1, 256, both, 0.05, 0.04, 16.0),
+        (2, 256, both, 0.05, 0.04, 16.0),
+        (2, 512, nearest, 0.05, 0.04, 16.0),
+        (2, 512, soft, 0.05, 0.05, 4.0),
+        (2, 512, both, 0.05, 0.05, 4.0),
         (2, 512, both, 0.05, 0.05, 16.0),
-        (2, 512, both, 0.05, 0.047, 16.0),
-        (2, 512, both, 0.05, 0.045, 16.0),
         (2, 512, both, 0.05, 0.04, 16.0),
+        (2, 512, both, 0.05, 0.03, 16.0),
+        (2, 512, both, 0.05, 0.04, 64.0),
+        (2, 512, both, 0.05, 0.03, 64.0),
+        (3, 512, both, 0.05, 0.04, 16.0),
+        (2, 768, both, 0.05, 0.04, 16.0),
     ] {
         let device = device("flex")?;
         let mut loaded = weights::load(Path::new(weights_path), &device)?;

@@ -46,12 +46,12 @@ pub struct TablesOptions {
     pub clean_weights: Vec<String>,
 
     /// Weights that were trained with the distribution distance loss, for table 5, where they are not those of
-    /// `--weights` [default: srrf-ddl, if the program has it, or the weights of srrf]
+    /// `--weights` [default: srrf-ddl, which the program has]
     #[arg(long, value_name = "PATH")]
     pub ddl_weights: Option<PathBuf>,
 
     /// Weights that were trained without the distribution distance loss and otherwise in the same way, for table 5
-    /// [default: srrf-no-ddl, if the program has it]
+    /// [default: srrf-no-ddl, which the program has]
     #[arg(long, value_name = "PATH")]
     pub no_ddl_weights: Option<PathBuf>,
 

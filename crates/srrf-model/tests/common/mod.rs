@@ -4,7 +4,8 @@
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use srrf_model::{
-    BranchConfig, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PfiConfig, SemConfig, SfeConfig, SrrfConfig,
+    BranchConfig, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PfiConfig, SemConfig,
+    SfeConfig, SrrfConfig,
 };
 
 /// splitmix64: the state grows by a constant, each output is a hash of it.
@@ -89,13 +90,15 @@ pub fn tiny() -> SrrfConfig {
         },
         dense: BranchConfig {
             tokens: 29,
-            confidence: false, matching: MatchingConfig::default(),
+            confidence: false,
+            matching: MatchingConfig::default(),
             sfe: SfeConfig { layers: 2, neighbours: 7, width: 9, heads: 3, mlp: 13 },
             pfi: pfi(1),
         },
         skeleton: BranchConfig {
             tokens: 0,
-            confidence: false, matching: MatchingConfig::default(),
+            confidence: false,
+            matching: MatchingConfig::default(),
             sfe: SfeConfig { layers: 3, neighbours: 5, width: 15, heads: 5, mlp: 7 },
             pfi: pfi(2),
         },
