@@ -26,6 +26,11 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     EMBEDDED.iter().map(|(name, _)| *name)
 }
 
+/// Whether [`load`] knows `name`.
+pub fn contains(name: &str) -> bool {
+    EMBEDDED.iter().chain(ABLATIONS).any(|(known, _)| *known == name)
+}
+
 /// An embedded model by name: `srrf-small` (trained on ModelNet40, the default), `srrf` (the full-size one,
 /// trained on the same shapes on a GPU) or `srrf-shapes` (trained on the built-in shapes). `None` if there
 /// is no model of that name. What they were trained from lies beside them as files, `srrf-small-start`, `srrf-small-2`
@@ -71,6 +76,7 @@ mod tests {
             assert_eq!(load(name, &device).unwrap().unwrap().name, name);
         }
         assert_eq!(names().count(), 3);
+        assert!(contains("srrf-ddl") && contains("srrf") && !contains("srrf-large"));
         for (name, _) in ABLATIONS {
             assert!(load(name, &device).unwrap().is_ok(), "{name}");
         }

@@ -89,7 +89,7 @@ impl Cast {
 
 /// The weights that an option gives, or a model of the program of this name, if there is one.
 pub(crate) fn model_or(option: Option<&Path>, name: &str) -> Option<PathBuf> {
-    let built_in = || embedded::names().find(|known| *known == name).map(PathBuf::from);
+    let built_in = || embedded::contains(name).then(|| PathBuf::from(name));
     option.map(Path::to_owned).or_else(built_in)
 }
 
