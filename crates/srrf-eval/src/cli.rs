@@ -66,8 +66,8 @@ pub struct Options {
     #[arg(long)]
     pub profile: bool,
 
-    /// Trained weights of srrf: a file, or `srrf-small`, `srrf` or `srrf-shapes` in the program [default:
-    /// srrf-small]; or METHOD=PATH for those of a learned baseline. May be given more than once
+    /// Trained weights of srrf: a file, or `srrf`, `srrf-small` or `srrf-shapes` in the program [default:
+    /// srrf]; or METHOD=PATH for those of a learned baseline. May be given more than once
     #[arg(long, value_name = "PATH")]
     pub weights: Vec<String>,
 

@@ -9,8 +9,8 @@ use crate::weights::{self, LoadedModel, WeightsError, from_safetensors};
 /// Names of the embedded models with their files; the model cards lie beside them in `weights/`.
 /// The first is the default.
 const EMBEDDED: &[(&str, &[u8])] = &[
-    ("srrf-small", include_bytes!("../weights/srrf-small.safetensors")),
     ("srrf", include_bytes!("../weights/srrf.safetensors")),
+    ("srrf-small", include_bytes!("../weights/srrf-small.safetensors")),
     ("srrf-shapes", include_bytes!("../weights/srrf-shapes.safetensors")),
 ];
 
@@ -31,10 +31,10 @@ pub fn contains(name: &str) -> bool {
     EMBEDDED.iter().chain(ABLATIONS).any(|(known, _)| *known == name)
 }
 
-/// An embedded model by name: `srrf-small` (trained on ModelNet40, the default), `srrf` (the full-size one,
-/// trained on the same shapes on a GPU) or `srrf-shapes` (trained on the built-in shapes). `None` if there
-/// is no model of that name. What they were trained from lies beside them as files, `srrf-small-start`, `srrf-small-2`
-/// and `srrf-start`. `srrf-ddl` and `srrf-no-ddl` are two skeleton modules to compare, whose branches are untrained.
+/// An embedded model by name: `srrf` (trained on ModelNet40, the default), `srrf-small` (trained on the same shapes,
+/// half the time) or `srrf-shapes` (trained on the built-in shapes). `None` if there is no model of that name. What
+/// they were trained from lies beside them as files, `srrf-start`, `srrf-small-start` and `srrf-small-2`. `srrf-ddl`
+/// and `srrf-no-ddl` are two skeleton modules to compare, whose branches are untrained.
 pub fn load(name: &str, device: &Device) -> Option<Result<LoadedModel, WeightsError>> {
     let (name, bytes) = EMBEDDED.iter().chain(ABLATIONS).find(|(known, _)| *known == name)?;
     Some(from_safetensors(bytes, &format!("embedded weights {name}"), device))
@@ -55,7 +55,7 @@ pub fn open(name: &str, device: &Device) -> Result<LoadedModel, WeightsError> {
     weights::load(Path::new(name), device)
 }
 
-/// The default model, `srrf-small`.
+/// The default model, `srrf`.
 ///
 /// # Errors
 /// [`WeightsError`] if the embedded bytes were damaged at build time.
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn every_embedded_model_loads_under_its_name() {
         let device = Device::flex();
-        assert_eq!(names().next(), Some("srrf-small"));
+        assert_eq!(names().next(), Some("srrf"));
         for name in names() {
             assert_eq!(load(name, &device).unwrap().unwrap().name, name);
         }
@@ -84,6 +84,6 @@ mod tests {
         assert_eq!(open("srrf-shapes", &device).unwrap().name, "srrf-shapes");
         let unknown = open("srrf-large", &device).unwrap_err().to_string();
         assert!(unknown.contains("srrf-large: no such file") && unknown.contains("srrf-shapes"), "{unknown}");
-        assert_eq!(load_default(&device).unwrap().name, "srrf-small");
+        assert_eq!(load_default(&device).unwrap().name, "srrf");
     }
 }

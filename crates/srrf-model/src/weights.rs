@@ -77,7 +77,7 @@ pub struct LoadedModel<C: NetworkConfig = SrrfConfig> {
     pub model: C::Network,
     /// Its sizes.
     pub config: C,
-    /// Name of the model, such as `srrf-small`.
+    /// Name of the model, such as `srrf`.
     pub name: String,
     /// SHA-256 of the file, in hexadecimal.
     pub sha256: String,

@@ -20,7 +20,7 @@ use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Sampli
 
 const SEED: u64 = 77_001;
 /// Shapes of the training split that the network was validated on: every n-th.
-const VALIDATION: usize = 104;
+const VALIDATION: usize = 192;
 
 struct Example {
     row: String,

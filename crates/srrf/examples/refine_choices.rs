@@ -3,7 +3,8 @@
 //! refinement, of a cautious one, of halfway between the network and that, and of the answer by the rule, beside
 //! what the rule sees.
 //!
-//! `cargo run --release -p srrf --example refine_choices -- MODELNET [SHAPES] > choices.csv`
+//! `cargo run --release -p srrf --example refine_choices -- MODELNET [EVERY] > choices.csv` takes every so many of these shapes
+//! (default: each); every other one of them gives its place to a built-in shape.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
 
 use std::path::Path;
@@ -17,14 +18,16 @@ use srrf_model::{SrrfRegister, device, embedded};
 use srrf_refine::{Metric, RefineConfig, RefineTarget, Verdict};
 
 const SEED: u64 = 77_002;
+/// Shapes that the default network was validated on: every n-th of the training split.
+const VALIDATION: usize = 192;
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let Some(data) = arguments.next() else {
-        println!("usage: refine_choices MODELNET [SHAPES]");
+        println!("usage: refine_choices MODELNET [EVERY]");
         return;
     };
-    let count: usize = arguments.next().map_or(104, |n| n.parse().unwrap());
+    let every: usize = arguments.next().map_or(1, |n| n.parse().unwrap());
     let shapes = open(Path::new(&data), Split::Train).unwrap();
     let flex = device("flex").unwrap();
     let network = SrrfRegister::new(embedded::load_default(&flex).unwrap(), flex);
@@ -38,8 +41,10 @@ fn main() {
         "corruption,sampling,severity,shape,class,start,full,cautious,halfway,rule,verdict,normal_correlation,correlation,median,\
          support_start,support_full,support_cautious,fitness,inlier_rmse,moved_full,moved_cautious,wide,fused_halfway"
     );
+    let count = VALIDATION;
     let lines: Vec<String> = (0..count * CorruptionKind::ALL.len())
         .into_par_iter()
+        .filter(|i| (i / CorruptionKind::ALL.len()).is_multiple_of(every))
         .map(|i| {
             let (shape, kind) = (i / CorruptionKind::ALL.len(), CorruptionKind::ALL[i % 12]);
             let severity = Severity::ALL[(shape + i) % 5];

@@ -100,7 +100,7 @@ pub struct Options {
     pub given: Option<Rigid>,
     /// The refinement; `None` answers with the coarse pose. Default on.
     pub refine: Option<RefineConfig>,
-    /// Weights: a file, or the name of a model in the program. Default `srrf-small`.
+    /// Weights: a file, or the name of a model in the program. Default `srrf`.
     pub weights: Option<String>,
     /// Device of the network. Default `flex`.
     pub device: String,

@@ -81,7 +81,7 @@ mod tests {
         let shapes = ProceduralShapes::new(7, 3, None).unwrap();
         let cloud = shapes.sample(1, 3001, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
         let near = skeleton(&cloud, None, "flex").unwrap();
-        assert_eq!((near.points.len(), near.radii.len(), near.weights.as_str()), (64, 64, "srrf-small"));
+        assert_eq!((near.points.len(), near.radii.len(), near.weights.as_str()), (256, 256, "srrf"));
         assert!(near.points.iter().all(|p| Vector3::from(*p).norm() < 1.1));
         assert!(near.radii.iter().all(|r| (0.0..1.0).contains(r)));
 

@@ -51,7 +51,7 @@ fn map_coordinates_keep_their_last_millimetre() {
     let pair = &shown["pairs"][0];
     for side in 0..2 {
         let (points, radii) = (&pair["skeletons"][side]["points"], &pair["skeletons"][side]["radii"]);
-        assert_eq!((points.as_array().unwrap().len(), radii.as_array().unwrap().len()), (64, 64));
+        assert_eq!((points.as_array().unwrap().len(), radii.as_array().unwrap().len()), (256, 256));
     }
     assert!(!pair["matches"].as_array().unwrap().is_empty());
 }

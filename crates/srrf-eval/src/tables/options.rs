@@ -35,7 +35,7 @@ pub struct TablesOptions {
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PARTS)]
     pub parts: Vec<String>,
 
-    /// Trained weights of srrf: a file, or the name of a model in the program [default: srrf-small]; or
+    /// Trained weights of srrf: a file, or the name of a model in the program [default: srrf]; or
     /// METHOD=PATH for those of a learned baseline. May be given more than once
     #[arg(long, value_name = "PATH")]
     pub weights: Vec<String>,

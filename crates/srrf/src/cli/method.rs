@@ -19,7 +19,7 @@ pub struct MethodArgs {
     #[arg(long)]
     pub no_refine: bool,
 
-    /// Weights of the network: a file, or a name that `srrf weights` lists [default: srrf-small]
+    /// Weights of the network: a file, or a name that `srrf weights` lists [default: srrf]
     #[arg(long, value_name = "NAME|FILE")]
     pub weights: Option<String>,
 

@@ -24,7 +24,7 @@ pub struct SkeletonArgs {
     /// The PLY file to write, or `-`
     output: PathBuf,
 
-    /// Weights of the network: a file, or a name that `srrf weights` lists [default: srrf-small]
+    /// Weights of the network: a file, or a name that `srrf weights` lists [default: srrf]
     #[arg(long, value_name = "NAME|FILE")]
     weights: Option<String>,
 

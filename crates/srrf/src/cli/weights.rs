@@ -13,8 +13,8 @@ use super::say::count;
 
 /// Model cards, by the name of the model.
 const CARDS: &[(&str, &str)] = &[
-    ("srrf-small", include_str!("../../../srrf-model/weights/srrf-small.md")),
     ("srrf", include_str!("../../../srrf-model/weights/srrf.md")),
+    ("srrf-small", include_str!("../../../srrf-model/weights/srrf-small.md")),
     ("srrf-shapes", include_str!("../../../srrf-model/weights/srrf-shapes.md")),
 ];
 
