@@ -2,7 +2,8 @@
 
 mod common;
 
-use burn::tensor::{Device, Tensor};
+use burn::module::{Module, ModuleMapper, Param};
+use burn::tensor::{DType, Device, Tensor};
 use common::{Numbers, difference, tensor, tensor64, values};
 use srrf_model::{MatchingConfig, Scaled, SoftMatching, init, sinkhorn};
 
@@ -22,6 +23,16 @@ fn features(seed: u64, points: usize) -> Vec<f64> {
 
 fn targets() -> Vec<f64> {
     Numbers(3).many(CLOUDS * TARGETS * 3)
+}
+
+/// Parameters as `f64`.
+struct Double;
+
+impl ModuleMapper for Double {
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let (id, tensor, mapper) = param.consume();
+        Param::from_mapped_value(id, tensor.cast(DType::F64), mapper)
+    }
 }
 
 #[test]
@@ -58,7 +69,8 @@ fn normalised_scores_do_not_know_how_long_features_are() {
         assert!(found.matched.is_none());
         values(&found.points)
     };
-    assert!(difference(&found(1.0), &found(30.0)) < 1e-5);
+    // The variance is kept above 1e-6, which is 1e-4 of that of the shorter features.
+    assert!(difference(&found(1.0), &found(30.0)) < 1e-3);
 }
 
 #[test]
@@ -76,7 +88,7 @@ fn slack_takes_what_has_no_match() {
     let matched = found.matched.as_ref().map(values).unwrap_or_default();
     for of_cloud in matched.chunks_exact(n) {
         let (last, others) = of_cloud.split_last().unwrap();
-        assert!(*last < 0.3 && others.iter().all(|p| *p > 0.7 && *p < 1.0), "{of_cloud:?}");
+        assert!(*last < 0.1 && others.iter().all(|p| *p > 0.5 && *p < 1.0), "{of_cloud:?}");
     }
     for (i, row) in values(&found.probabilities).chunks_exact(m).enumerate() {
         assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-5);
@@ -93,7 +105,7 @@ fn gradients_are_those_of_finite_differences() {
     let weights = Numbers(5).many(CLOUDS * SOURCES * 4);
     let loss = |x: Tensor<3>| {
         let device = x.device();
-        let config = BOTH.init(&device);
+        let config = BOTH.init(&device).map(&mut Double);
         let y = tensor64(&y, [CLOUDS, TARGETS, WIDTH], &device);
         let points = tensor64(&targets(), [CLOUDS, TARGETS, 3], &device);
         let found = config.forward(x, y, points);

@@ -59,10 +59,10 @@ fn skeleton_has_radii() {
         .skip(1)
         .map(|l| l.split(' ').map(|w| w.parse().unwrap()).collect())
         .collect();
-    assert_eq!(rows.len(), 64);
+    assert_eq!(rows.len(), 256);
     // Inside the chair, which has a radius of 1.5 m.
     assert!(rows.iter().all(|r| r[3] > 0.0 && r[3] < 1.5 && (r[0] - 500_123.25).abs() < 1.7), "{rows:?}");
-    assert_eq!(read_cloud(&scene.path("skeleton.ply")).unwrap().len(), 64);
+    assert_eq!(read_cloud(&scene.path("skeleton.ply")).unwrap().len(), 256);
 }
 
 #[test]

@@ -166,21 +166,23 @@ mod tests {
 
     #[test]
     fn skeletons_are_drawn_from_the_models_own_numbers() {
+        /// Skeleton points of the default model.
+        const POINTS: usize = 256;
         let shapes = data::procedural(1).unwrap();
         let cloud = shapes.sample(0, 300, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
         let context = MethodContext::of_srrf(None, "flex");
         let found = extract(&context, &cloud).unwrap();
-        assert_eq!((found.points.len(), found.radii.len()), (64, 64));
-        assert_eq!(found.weights.len(), found.samples.len() * 64);
+        assert_eq!((found.points.len(), found.radii.len()), (POINTS, POINTS));
+        assert_eq!(found.weights.len(), found.samples.len() * POINTS);
         // S = W^T X*: the weights of a skeleton point sum to 1 and give it back.
-        let column: Vec<f64> = (0..found.samples.len()).map(|i| found.weights[64 * i + 5]).collect();
+        let column: Vec<f64> = (0..found.samples.len()).map(|i| found.weights[POINTS * i + 5]).collect();
         assert!((column.iter().sum::<f64>() - 1.0).abs() < 1e-4);
         for c in 0..3 {
             let combined: f64 = column.iter().zip(&found.samples).map(|(w, p)| w * p[c]).sum();
             assert!((combined - found.points[5][c]).abs() < 1e-4);
         }
         let figure = samplings(&context, &[&cloud], 1).unwrap();
-        assert_eq!(figure.svg.matches("<circle").count(), 64);
+        assert_eq!(figure.svg.matches("<circle").count(), POINTS);
         assert!(weights(&context, &[&cloud]).unwrap().svg.matches("<path").count() > 12);
     }
 }
