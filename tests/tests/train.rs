@@ -125,6 +125,14 @@ fn a_run_starts_from_parts_of_others() {
     let wrong = format!("start = {{ hands = \"{from_a}\" }}");
     let [config, folder] = configured("wrong", &wrong, 5);
     refuses("srrf-train", &["--config", &config, "--run", &folder], &["`hands`", "does not fit", "start"]);
+    let [config, folder] = configured("nothing", "start = { sem = \"no/such.safetensors\" }", 5);
+    refuses(
+        "srrf-train",
+        &["--config", &config, "--run", &folder],
+        &["start", "no/such.safetensors", "no such file"],
+    );
+    let [config, _] = configured("number", "start = 5", 5);
+    refuses("srrf-train", &["--config", &config], &["number.toml", "start", "a table of them by part"]);
 }
 
 #[test]

@@ -83,7 +83,7 @@ pub struct TrainConfig<C: Trained = SrrfConfig> {
 
 /// Weights to start from: files, or names of models in the program.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "must be a file or a name, or a table of them by part of the network")]
 pub enum StartConfig {
     /// All of a network.
     Whole(String),

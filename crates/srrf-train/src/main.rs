@@ -126,7 +126,13 @@ fn train<C: Trained>(arguments: Arguments) -> Result<ExitCode, Failure> {
     tell(&format!("config {}, data {}", arguments.config.display(), shapes.description()));
     tell(&format!("run {}, device {}, {} threads", options.folder.display(), name, options.threads));
     let ended = run(&config, &options, shapes, device, &stop).map_err(|e| {
-        let input = matches!(e, RunError::Exists { .. } | RunError::Checkpoint(_) | RunError::Start { .. });
+        let input = matches!(
+            e,
+            RunError::Exists { .. }
+                | RunError::Checkpoint(_)
+                | RunError::Start { .. }
+                | RunError::StartFile { .. }
+        );
         let code = if input { 2 } else { 1 };
         Failure(code, e.to_string())
     })?;

@@ -61,6 +61,15 @@ pub enum RunError {
     /// No thread could be started.
     #[error("no worker thread could be started: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The weights to start from cannot be read.
+    #[error("start = {start:?}: {source}")]
+    StartFile {
+        /// The weights, as the configuration names them.
+        start: String,
+        /// What is wrong with them.
+        #[source]
+        source: srrf_model::weights::WeightsError,
+    },
     /// The weights to start from are of another network.
     #[error(
         "start = \"{start}\": its `{name}` does not fit this network; make [network] as that of the weights, or \
@@ -409,8 +418,9 @@ fn starting_model<C: Trained>(
     for (part, start) in parts {
         let wrong = |name: String| RunError::Start { start: start.clone(), name };
         let within = |name: &String| part.is_empty() || name.split('.').next() == Some(part);
-        let theirs: Vec<_> =
-            parameters(&C::start(start, device)?).into_iter().filter(|(name, _)| within(name)).collect();
+        let unread = |source| RunError::StartFile { start: start.clone(), source };
+        let loaded = C::start(start, device).map_err(unread)?;
+        let theirs: Vec<_> = parameters(&loaded).into_iter().filter(|(name, _)| within(name)).collect();
         if theirs.is_empty() {
             return Err(wrong(part.to_string()));
         }
