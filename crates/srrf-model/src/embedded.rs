@@ -26,9 +26,14 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     EMBEDDED.iter().map(|(name, _)| *name)
 }
 
+/// The file of a network in the program.
+fn file(name: &str) -> Option<&'static [u8]> {
+    EMBEDDED.iter().chain(ABLATIONS).find(|(known, _)| *known == name).map(|(_, bytes)| *bytes)
+}
+
 /// Whether [`load`] knows `name`.
 pub fn contains(name: &str) -> bool {
-    EMBEDDED.iter().chain(ABLATIONS).any(|(known, _)| *known == name)
+    file(name).is_some()
 }
 
 /// An embedded model by name: `srrf` (trained on ModelNet40, the default), `srrf-small` (trained on the same shapes,
@@ -36,8 +41,7 @@ pub fn contains(name: &str) -> bool {
 /// they were trained from lies beside them as files, `srrf-start`, `srrf-small-start` and `srrf-small-2`. `srrf-ddl`
 /// and `srrf-no-ddl` are two skeleton modules to compare, whose branches are untrained.
 pub fn load(name: &str, device: &Device) -> Option<Result<LoadedModel, WeightsError>> {
-    let (name, bytes) = EMBEDDED.iter().chain(ABLATIONS).find(|(known, _)| *known == name)?;
-    Some(from_safetensors(bytes, &format!("embedded weights {name}"), device))
+    Some(from_safetensors(file(name)?, &format!("embedded weights {name}"), device))
 }
 
 /// The weights that a user names: a model in the program, or a file.

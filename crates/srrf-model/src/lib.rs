@@ -39,7 +39,7 @@ pub use device::{DeviceError, NAMES as DEVICE_NAMES, built_in as built_in_device
 pub use integration::{BranchPose, Fusion, InlierTest, IntegrationConfig};
 pub use layout::{BranchLayout, Neighbourhood, SemLayout, SrrfLayout};
 pub use loss::{correspondence_loss, matching_loss, registration_loss};
-pub use matching::{MatchingConfig, Scaled, SoftMatches, SoftMatching, sinkhorn, soft_matches};
+pub use matching::{MatchingConfig, Scaled, SoftMatches, SoftMatching, sinkhorn, soft_matches, standardised};
 pub use memory::keep_freed_memory;
 pub use norm::GroupNorm;
 pub use pfi::{Pfi, PfiConfig};

@@ -112,10 +112,7 @@ impl SoftMatching {
             let scaled = source_features * (sharpness / (width as f64).sqrt());
             return scaled.matmul(target_features.transpose());
         }
-        let scores = source_features.matmul(target_features.transpose()) / width as f64;
-        let centred = scores.clone() - scores.mean_dim(2).mean_dim(1);
-        let variance = centred.clone().square().mean_dim(2).mean_dim(1);
-        centred * (sharpness / (variance + 1e-6).sqrt())
+        standardised(source_features.matmul(target_features.transpose()) / width as f64, 1e-6) * sharpness
     }
 }
 
@@ -128,6 +125,16 @@ pub fn soft_matches(scores: Tensor<3>, target_points: Tensor<3>) -> SoftMatches 
     SoftMatches { points: probabilities.clone().matmul(target_points), probabilities, matched: None }
 }
 
+/// The scores of each pair brought to mean 0 and standard deviation 1; `epsilon` is added to the variance.
+///
+/// # Shapes
+/// - `scores` and output: `[batch, n, m]`
+pub fn standardised(scores: Tensor<3>, epsilon: f64) -> Tensor<3> {
+    let centred = scores.clone() - scores.mean_dim(2).mean_dim(1);
+    let variance = centred.clone().square().mean_dim(2).mean_dim(1);
+    centred / (variance + epsilon).sqrt()
+}
+
 /// A matrix brought to row and column sums of at most 1: `u_i K_ij v_j`.
 #[derive(Debug, Clone)]
 pub struct Scaled {
@@ -137,6 +144,13 @@ pub struct Scaled {
     pub rows: Tensor<3>,
     /// `v`: `[batch, m, 1]`.
     pub columns: Tensor<3>,
+}
+
+impl Scaled {
+    /// The matrix itself, without slack: `[batch, n, m]`.
+    pub fn matrix(self) -> Tensor<3> {
+        self.kernel * self.rows * self.columns.transpose()
+    }
 }
 
 /// Sinkhorn with a slack row and column of score 0, which take what has no match: the others are brought to

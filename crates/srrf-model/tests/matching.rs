@@ -5,7 +5,7 @@ mod common;
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{DType, Device, Tensor};
 use common::{Numbers, difference, tensor, tensor64, values};
-use srrf_model::{MatchingConfig, Scaled, SoftMatching, init, sinkhorn};
+use srrf_model::{MatchingConfig, SoftMatching, init, sinkhorn};
 
 const CLOUDS: usize = 3;
 const SOURCES: usize = 5;
@@ -39,8 +39,7 @@ impl ModuleMapper for Double {
 fn sinkhorn_agrees_with_the_form_in_logarithms() {
     let (n, m) = (SOURCES, TARGETS);
     let scores: Vec<f64> = Numbers(4).many(n * m).iter().map(|v| 4.0 * v).collect();
-    let Scaled { kernel, rows, columns } = sinkhorn(tensor64(&scores, [1, n, m], &Device::flex()), 20);
-    let found = values(&(kernel * rows * columns.transpose()));
+    let found = values(&sinkhorn(tensor64(&scores, [1, n, m], &Device::flex()), 20).matrix());
     let mut log = vec![vec![0.0; m + 1]; n + 1];
     (0..n * m).for_each(|i| log[i / m][i % m] = scores[i]);
     for _ in 0..20 {
@@ -55,6 +54,8 @@ fn sinkhorn_agrees_with_the_form_in_logarithms() {
     }
     let wanted: Vec<f64> = (0..n * m).map(|i| log[i / m][i % m].exp()).collect();
     assert!(difference(&found, &wanted) < 1e-12);
+    let sums = |i: usize| found[i * m..(i + 1) * m].iter().sum::<f64>();
+    assert!((0..n).all(|i| sums(i) < 1.01) && (0..n).any(|i| sums(i) > 0.5));
 }
 
 #[test]

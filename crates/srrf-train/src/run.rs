@@ -431,8 +431,7 @@ fn starting_model<C: Trained>(
             }
         }
     }
-    let start = || format!("{start:?}");
-    with_parameters(fresh, values).map_err(|(name, _)| RunError::Start { start: start(), name })
+    with_parameters(fresh, values).map_err(|(name, _)| RunError::Start { start: format!("{start:?}"), name })
 }
 
 fn merge((sums, count): &mut (Losses, usize), losses: Losses) {

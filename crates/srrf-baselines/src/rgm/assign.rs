@@ -1,20 +1,10 @@
-//! Assignments: Sinkhorn with slack, and the Hungarian method.
+//! One-to-one matches of an assignment: the Hungarian method.
 
 use burn::tensor::{Tensor, TensorData};
-use srrf_model::Scaled;
 use srrf_model::geometry::rows;
 
 /// A node whose row or column sums to less has no match.
 const LEAST_SUM: f64 = 0.5;
-
-/// The assignment by [`srrf_model::sinkhorn`].
-///
-/// # Shapes
-/// - `scores`: `[batch, n, m]`, output: `[batch, n, m]`, without the slack
-pub(super) fn sinkhorn(scores: Tensor<3>, iterations: usize) -> Tensor<3> {
-    let Scaled { kernel, rows, columns } = srrf_model::sinkhorn(scores, iterations);
-    kernel * rows * columns.transpose()
-}
 
 /// The match of each source point by the Hungarian method, and its weight: the assignment's entry, 0 for
 /// nodes without a match (all count where fewer than 3 would). Weights sum to 1 in each cloud.
@@ -114,37 +104,10 @@ fn hungarian(scores: &[f64], n: usize, m: usize) -> Vec<Option<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use burn::tensor::Device;
-
     use super::*;
 
     fn scores(count: usize) -> Vec<f64> {
         (0..count).map(|i| ((i * i) as f64 * 0.713).sin()).collect()
-    }
-
-    #[test]
-    fn sinkhorn_agrees_with_the_form_in_logarithms() {
-        let (n, m) = (5, 7);
-        let values: Vec<f64> = scores(n * m).iter().map(|v| 4.0 * v).collect();
-        let tensor = Tensor::from_data(TensorData::new(values.clone(), [1, n, m]), &Device::flex());
-        let found = sinkhorn(tensor, 20).try_to_vec_as::<f64>().unwrap();
-        let mut log = vec![vec![0.0; m + 1]; n + 1];
-        (0..n * m).for_each(|i| log[i / m][i % m] = values[i]);
-        for _ in 0..20 {
-            for row in log.iter_mut().take(n) {
-                let sum = row.iter().map(|v: &f64| v.exp()).sum::<f64>().ln();
-                row.iter_mut().for_each(|v| *v -= sum);
-            }
-            for j in 0..m {
-                let sum = log.iter().map(|row| row[j].exp()).sum::<f64>().ln();
-                log.iter_mut().for_each(|row| row[j] -= sum);
-            }
-        }
-        for (i, f) in found.iter().enumerate() {
-            assert!((f - log[i / m][i % m].exp()).abs() < 1e-5, "{i}");
-        }
-        let sums = |i: usize| found[i * m..(i + 1) * m].iter().sum::<f64>();
-        assert!((0..n).all(|i| sums(i) < 1.01) && (0..n).any(|i| sums(i) > 0.5));
     }
 
     #[test]

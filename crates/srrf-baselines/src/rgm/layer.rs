@@ -5,6 +5,7 @@ use burn::nn::{Linear, LinearConfig};
 use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor};
 use srrf_model::fast::{Activation, linear};
+use srrf_model::standardised;
 
 use crate::dgcnn::halves;
 use crate::pre_norm::Transformer;
@@ -87,10 +88,7 @@ impl GraphLayer {
         let [_, width, _] = symmetric.dims();
         let symmetric = symmetric.clone() + identity(1, width, &symmetric);
         let scores = source.matmul(symmetric).matmul(target.transpose());
-        let centred = scores.clone() - scores.mean_dim(2).mean_dim(1);
-        let variance = centred.clone().square().mean_dim(2).mean_dim(1);
-        let normal = centred / (variance + 1e-5).sqrt();
-        normal * gamma.val().unsqueeze::<3>() + beta.val().unsqueeze::<3>()
+        standardised(scores, 1e-5) * gamma.val().unsqueeze::<3>() + beta.val().unsqueeze::<3>()
     }
 
     /// Joins each node with what the assignment puts opposite to it; leaves the nodes as they are in the

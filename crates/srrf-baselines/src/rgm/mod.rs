@@ -4,7 +4,7 @@
 //! that graph, an affinity of the nodes, and Sinkhorn; the assignment is learned by cross-entropy. At test
 //! the Hungarian method makes it one-to-one, and a weighted SVD gives the pose. Where this differs from
 //! the authors' code: group norm for batch norm in the features, Sinkhorn in its scaling form
-//! ([`sinkhorn`](self::assign::sinkhorn)), nodes at `tokens` points, and no second matching from the
+//! ([`sinkhorn`]), nodes at `tokens` points, and no second matching from the
 //! target's side at test, to intersect with the first.
 
 mod assign;
@@ -15,7 +15,7 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 use srrf_model::geometry::even_tokens;
-use srrf_model::{NetworkConfig, WrongSize, transform, weighted_procrustes};
+use srrf_model::{NetworkConfig, WrongSize, sinkhorn, transform, weighted_procrustes};
 
 use crate::dgcnn::{Dgcnn, halves};
 use crate::learned::{LearnedConfig, Lesson, Pose};
@@ -145,7 +145,7 @@ impl RgmConfig {
         let mut assignment = Tensor::zeros([batch, n, n], &source_points.device());
         for layer in &network.layers {
             nodes = layer.convolve(nodes);
-            assignment = assign::sinkhorn(layer.affinity(nodes.clone()), self.sinkhorn);
+            assignment = sinkhorn(layer.affinity(nodes.clone()), self.sinkhorn).matrix();
             nodes = layer.mix(nodes, &assignment);
         }
         Matched { source_points, target_points, assignment }
