@@ -33,9 +33,10 @@ const GRADIENT: f64 = 1e-3;
 const LOSSES: f64 = 1e-3;
 const MOVED: f64 = 1e-2;
 
-/// How much wider the tolerances are on `cuda`: CubeCL's kernels for tensor cores round `f32` factors to TF32, whose
-/// unit roundoff is `2^-11`, or 4.9e-4, where that of `f32` is 6.0e-8, and Burn has no switch for it.
-const TF32: f64 = 20.0;
+/// That of the forward pass on `cuda`: CubeCL's kernels for tensor cores round `f32` factors to TF32, whose unit
+/// roundoff is `2^-11`, or 4.9e-4, where that of `f32` is 6.0e-8, and Burn has no switch for it. The others have
+/// not been measured there, and stand as they are.
+const FORWARD_TF32: f64 = 2e-3;
 
 const PAIRS: usize = 3;
 const STEPS: usize = 5;
@@ -185,19 +186,16 @@ fn compare(what: &str, (ours, wanted): (&Numbers, &Numbers), least: f64, toleran
     worst
 }
 
-fn wider(name: &str) -> f64 {
-    if name == "cuda" { TF32 } else { 1.0 }
-}
-
 /// Holds a device against flex.
 fn agrees(name: &str, device: &Device, dtype: DType) {
     let (wanted, wanted_gradients) = pass(&Device::flex(), DType::F32);
     assert!(wanted.len() == 10 && wanted_gradients.len() > 50, "something to compare");
     let (found, gradients) = pass(device, dtype);
-    let forward = compare(&format!("{name}, forward"), (&found, &wanted), 0.0, FORWARD * wider(name));
+    let tolerance = if name == "cuda" { FORWARD_TF32 } else { FORWARD };
+    let forward = compare(&format!("{name}, forward"), (&found, &wanted), 0.0, tolerance);
     // Some gradients are 0 by construction and come out as what rounding leaves.
     let what = format!("{name}, gradient");
-    let backward = compare(&what, (&gradients, &wanted_gradients), 1e-2, GRADIENT * wider(name));
+    let backward = compare(&what, (&gradients, &wanted_gradients), 1e-2, GRADIENT);
     eprintln!("{name}: forward {forward:.1e}, gradients {backward:.1e}");
 }
 
@@ -206,13 +204,11 @@ fn trains(name: &str, device: &Device) {
     let (wanted, wanted_moved) = train(&Device::flex());
     let (found, moved) = train(device);
     let losses = found.iter().zip(&wanted).map(|(a, b)| ((a - b) / b).abs()).fold(0.0, f64::max);
-    let least = LOSSES * wider(name);
-    assert!(found.iter().all(|loss| loss.is_finite()) && losses <= least, "{name}: {found:?}, {wanted:?}");
+    assert!(found.iter().all(|loss| loss.is_finite()) && losses <= LOSSES, "{name}: {found:?}, {wanted:?}");
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let difference: Vec<f64> = moved.iter().zip(&wanted_moved).map(|(a, b)| a - b).collect();
     let share = norm(&difference) / norm(&wanted_moved);
-    let most = MOVED * wider(name);
-    assert!(share <= most, "{name}: the parameters moved {share:e} apart, {most:e} allowed");
+    assert!(share <= MOVED, "{name}: the parameters moved {share:e} apart, {MOVED:e} allowed");
     eprintln!("{name}: losses {losses:.1e}, parameters after {STEPS} steps {share:.1e}");
 }
 
