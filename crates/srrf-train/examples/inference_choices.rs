@@ -33,17 +33,33 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         held_out.len()
     );
     println!(
-        "| passes | tokens | inlier test | sharpness | dense | skeleton | fused |\n|---|---|---|---|---|---|---|"
+        "| passes | tokens | inlier test | sharpness | dense | skeleton | fused | the better branch |\n\
+         |---|---|---|---|---|---|---|---|"
     );
     let (nearest, both, soft) = (InlierTest::Nearest, InlierTest::BothWays, InlierTest::SoftMatch);
     for (passes, tokens, test, threshold, skeleton_threshold, sharpness) in [
         (1, 256, nearest, 0.05, 0.05, 1.0),
+        (1, 256, nearest, 0.05, 0.05, 16.0),
         (1, 256, both, 0.05, 0.04, 16.0),
+        (2, 256, nearest, 0.05, 0.05, 1.0),
+        (2, 256, nearest, 0.05, 0.05, 16.0),
+        (2, 256, nearest, 0.05, 0.05, 64.0),
+        (2, 256, nearest, 0.03, 0.03, 16.0),
+        (2, 256, nearest, 0.02, 0.02, 16.0),
+        (2, 256, nearest, 0.08, 0.08, 16.0),
+        (2, 256, soft, 0.05, 0.1, 1.0),
+        (3, 256, nearest, 0.05, 0.05, 16.0),
+        (2, 256, both, 0.05, 0.05, 4.0),
+        (2, 256, both, 0.05, 0.05, 16.0),
+        (2, 256, both, 0.05, 0.05, 64.0),
         (2, 256, both, 0.05, 0.04, 16.0),
+        (2, 512, nearest, 0.05, 0.05, 16.0),
         (2, 512, nearest, 0.05, 0.04, 16.0),
         (2, 512, soft, 0.05, 0.05, 4.0),
         (2, 512, both, 0.05, 0.05, 4.0),
         (2, 512, both, 0.05, 0.05, 16.0),
+        (2, 512, both, 0.05, 0.047, 16.0),
+        (2, 512, both, 0.05, 0.045, 16.0),
         (2, 512, both, 0.05, 0.04, 16.0),
         (2, 512, both, 0.05, 0.03, 16.0),
         (2, 512, both, 0.05, 0.04, 64.0),
@@ -69,7 +85,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Dense, skeleton and fused poses of a method, as `RMSE / MAE / median`.
+/// Dense, skeleton and fused poses of a method, and of the two branches the one that the truth prefers, as `RMSE / MAE /
+/// median`.
 fn score(
     method: &SrrfRegister,
     pairs: &[Pair],
@@ -81,10 +98,12 @@ fn score(
             let (source, target) = clouds(&pairs[i]);
             let answer = method.register(&source, &target).ok()?;
             let branch = |b: usize| answer.branches.get(b).map(|branch| branch.target_from_source);
-            Some([branch(0), branch(1), Some(answer.target_from_source)])
+            let off = |b: usize| branch(b).map(|pose| pose.angle_to_deg(&pairs[i].target_from_source));
+            let better = usize::from(off(1) < off(0));
+            Some([branch(0), branch(1), Some(answer.target_from_source), branch(better)])
         })
         .ok_or("a worker stopped")?;
-    (0..3)
+    (0..4)
         .map(|row| {
             let errors: Vec<PairError> = pairs
                 .iter()

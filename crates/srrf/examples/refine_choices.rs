@@ -41,8 +41,7 @@ fn main() {
         "corruption,sampling,severity,shape,class,start,full,cautious,halfway,rule,verdict,normal_correlation,correlation,median,\
          support_start,support_full,support_cautious,fitness,inlier_rmse,moved_full,moved_cautious,wide,fused_halfway"
     );
-    let count = VALIDATION;
-    let lines: Vec<String> = (0..count * CorruptionKind::ALL.len())
+    let lines: Vec<String> = (0..VALIDATION * CorruptionKind::ALL.len())
         .into_par_iter()
         .filter(|i| (i / CorruptionKind::ALL.len()).is_multiple_of(every))
         .map(|i| {
@@ -52,7 +51,7 @@ fn main() {
             let independent = shape % 2 == 1;
             let shapes: &dyn ShapeSource = if independent { &built_in } else { shapes.as_ref() };
             let synthesizer = &synthesizers[usize::from(independent)];
-            let index = ((shape as f64 + 0.5) * shapes.len() as f64 / count as f64) as usize;
+            let index = ((shape as f64 + 0.5) * shapes.len() as f64 / VALIDATION as f64) as usize;
             let stream = Stream { seed: SEED, item: i as u64 };
             let pair = synthesizer
                 .pair(shapes, index, Some((kind, severity)), PoseDraw::Seeded, stream)

@@ -198,7 +198,9 @@ mod tests {
         let model = Logistic::embedded().unwrap();
         let good = Features([1.0, 1.0, 0.1, 0.9, 0.0, 0.05, 0.3, 1.0, 0.0]);
         let bad = Features([0.3, 0.3, 0.6, 0.2, 0.5, 1.5, 1.0, 0.1, 0.0]);
-        let (good, bad) = (model.probability(&good), model.probability(&bad));
-        assert!(good > 0.9 && bad < 0.5, "{good} {bad}");
+        // What `srrf register` finds of bun315 and bun090, two scans that share a tenth, in a wrong pose.
+        let wrong = Features([0.1288, 0.1422, 0.6476, 0.1182, 0.5388, 3.0, 0.9878, 0.0323, 0.0]);
+        let [good, bad, wrong] = [good, bad, wrong].map(|features| model.probability(&features));
+        assert!(good > 0.9 && bad < 0.5 && wrong < 0.3, "{good} {bad} {wrong}");
     }
 }
