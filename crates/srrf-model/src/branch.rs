@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::confidence::Confidence;
 use crate::geometry::{HostClouds, rows};
+use crate::inference::Matches;
 use crate::integration::BranchPose;
 use crate::layout::BranchLayout;
 use crate::matching::{MatchingConfig, SoftMatching};
@@ -93,6 +94,12 @@ impl Branch {
     /// also when the branch was trained with fewer.
     pub fn with_tokens(mut self, tokens: usize) -> Self {
         self.tokens = tokens;
+        self
+    }
+
+    /// Where source points go; training takes the mean.
+    pub fn with_matches(mut self, matches: Matches) -> Self {
+        self.matching = self.matching.with_matches(matches);
         self
     }
 

@@ -16,6 +16,7 @@ pub mod embedded;
 pub mod fast;
 pub mod geometry;
 pub mod init;
+mod inference;
 mod integration;
 mod layout;
 mod loss;
@@ -35,7 +36,10 @@ pub mod weights;
 
 pub use batch::{HostPairs, PairBatch, PairFrame};
 pub use branch::{Branch, BranchConfig, BranchOutput};
-pub use device::{DeviceError, NAMES as DEVICE_NAMES, built_in as built_in_devices, device, is_accelerator};
+pub use device::{
+    DeviceError, NAMES as DEVICE_NAMES, built_in as built_in_devices, device, devices, is_accelerator,
+};
+pub use inference::{InferenceConfig, Matches};
 pub use integration::{BranchPose, Fusion, InlierTest, IntegrationConfig};
 pub use layout::{BranchLayout, Neighbourhood, SemLayout, SrrfLayout};
 pub use loss::{correspondence_loss, matching_loss, registration_loss};

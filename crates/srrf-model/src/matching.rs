@@ -5,6 +5,9 @@ use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::rows;
+use crate::inference::Matches;
+
 /// Scores beyond this are cut before the exponential.
 const MOST: f64 = 30.0;
 /// Sharpness of normalised scores at the start of a training; trained networks have 1.3 to 1.9.
@@ -41,6 +44,7 @@ impl MatchingConfig {
             slack: (self.sinkhorn > 0).then(|| constant(SLACK)),
             normalise: self.normalise,
             sinkhorn: self.sinkhorn,
+            best: false,
         }
     }
 }
@@ -54,12 +58,13 @@ pub struct SoftMatching {
     slack: Option<Param<Tensor<1>>>,
     normalise: bool,
     sinkhorn: usize,
+    best: bool,
 }
 
 /// Soft matches of the source points.
 #[derive(Debug, Clone)]
 pub struct SoftMatches {
-    /// `yhat`, the expected target point of each source point: `[batch, n, 3]`.
+    /// `yhat`, the expected target point of each source point, or the most probable one: `[batch, n, 3]`.
     pub points: Tensor<3>,
     /// `m(x_i, Y)`, the probability of each target point, given that there is a match: `[batch, n, m]`.
     pub probabilities: Tensor<3>,
@@ -72,6 +77,11 @@ impl SoftMatching {
     /// The paper's matching, at temperature 1.
     pub fn new(device: &Device) -> Self {
         MatchingConfig::default().init(device)
+    }
+
+    /// Where source points go; training takes the mean.
+    pub fn with_matches(self, matches: Matches) -> Self {
+        Self { best: matches == Matches::Best, ..self }
     }
 
     /// `m(x_i, Y) = softmax(Phi_Y Phi_x^T / (T sqrt(d)))` and `yhat_i = Y^T m(x_i, Y)`.
@@ -89,6 +99,14 @@ impl SoftMatching {
         target_points: Tensor<3>,
     ) -> SoftMatches {
         let scores = self.scores(source_features, target_features);
+        let found = self.soft(scores, target_points.clone());
+        if !self.best {
+            return found;
+        }
+        SoftMatches { points: most_probable(&found.probabilities, target_points), ..found }
+    }
+
+    fn soft(&self, scores: Tensor<3>, target_points: Tensor<3>) -> SoftMatches {
         let Some(slack) = &self.slack else { return soft_matches(scores, target_points) };
         // Target points first, so that source points come last: each sums to 1 with its slack.
         let transposed = (scores - slack.val().unsqueeze::<3>()).transpose();
@@ -114,6 +132,15 @@ impl SoftMatching {
         }
         standardised(source_features.matmul(target_features.transpose()) / width as f64, 1e-6) * sharpness
     }
+}
+
+/// The most probable target point of each source point: `[batch, n, 3]`.
+fn most_probable(probabilities: &Tensor<3>, target_points: Tensor<3>) -> Tensor<3> {
+    let [batch, n, m] = probabilities.dims();
+    let best = probabilities.clone().argmax(2).try_to_vec_as::<i64>().unwrap_or_default();
+    let row = |(i, best): (usize, i64)| (i / n * m) as i64 + best;
+    let best: Vec<i64> = best.into_iter().enumerate().map(row).collect();
+    rows(target_points.reshape([batch * m, 3]), &best).reshape([batch, n, 3])
 }
 
 /// `m = softmax(scores)` over the target points, and `yhat = m Y`.

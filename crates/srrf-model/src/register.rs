@@ -9,6 +9,7 @@ use srrf_cloud::{
 use crate::batch::{PairBatch, PairFrame};
 use crate::branch::BranchOutput;
 use crate::geometry::even_subsample;
+use crate::inference::InferenceConfig;
 use crate::integration::IntegrationConfig;
 use crate::sem;
 use crate::srrf::Srrf;
@@ -21,27 +22,28 @@ const PHASE: f32 = 0.5;
 #[derive(Debug)]
 pub struct SrrfRegister {
     model: Srrf,
+    /// The same network, as the last pass uses it.
+    last: Srrf,
     integration: IntegrationConfig,
     device: Device,
     /// Largest number of points that the network sees of a cloud; larger clouds are subsampled
     /// evenly. It was trained with 1,024.
     pub max_points: usize,
-    /// How often the network is applied, each time to the source as the last pose left it.
-    /// Default: 2, which on the validation part takes a tenth off RMSE(R) and a quarter off MAE(R)
-    /// (docs/experiments.md); 1 is the paper.
+    /// How often the network is applied, as [`InferenceConfig::passes`].
     pub passes: usize,
 }
 
 impl SrrfRegister {
     /// The network of a weights file; `device` must be the one it was loaded on.
     pub fn new(loaded: LoadedModel, device: Device) -> Self {
-        Self {
-            model: loaded.model.valid(),
-            integration: loaded.config.integration,
-            device,
-            max_points: 1024,
-            passes: 2,
+        let InferenceConfig { passes, last_tokens, last_matches } = loaded.config.inference;
+        let (model, integration) = (loaded.model.valid(), loaded.config.integration);
+        let mut last = model.clone();
+        last.dense = last.dense.with_matches(last_matches);
+        if let Some(tokens) = last_tokens {
+            last.dense = last.dense.with_tokens(tokens);
         }
+        Self { model, last, integration, device, max_points: 1024, passes }
     }
 
     /// A network for a quick look: one pass, with at most `tokens` tokens in the dense branch.
@@ -49,13 +51,14 @@ impl SrrfRegister {
         if loaded.config.dense.tokens == 0 || loaded.config.dense.tokens > tokens {
             loaded.model.dense = loaded.model.dense.with_tokens(tokens);
         }
-        Self { passes: 1, ..Self::new(loaded, device) }
+        loaded.config.inference = InferenceConfig::paper();
+        Self::new(loaded, device)
     }
 
     /// One pass over pairs that all have `points` points a cloud.
-    fn pass(&self, pairs: &[(&PointCloud, &PointCloud)]) -> Vec<Option<Registration>> {
+    fn pass(&self, model: &Srrf, pairs: &[(&PointCloud, &PointCloud)]) -> Vec<Option<Registration>> {
         let Some(batch) = PairBatch::new(pairs, &self.device) else { return vec![None; pairs.len()] };
-        let output = self.model.forward(&self.integration, batch.source.clone(), batch.target.clone(), PHASE);
+        let output = model.forward(&self.integration, batch.source.clone(), batch.target.clone(), PHASE);
         let fused = batch.poses(&output.fused.rotation, &output.fused.translation);
         let dense = batch.poses(&output.dense.rotation, &output.dense.translation);
         let skeleton = batch.poses(&output.skeleton.rotation, &output.skeleton.translation);
@@ -109,10 +112,12 @@ impl SrrfRegister {
         let points = source.len().min(target.len()).min(self.max_points);
         let (source, target) = (subsample(source, points)?, subsample(target, points)?);
         let mut found: Option<Registration> = None;
-        for _ in 0..self.passes.max(1) {
+        let passes = self.passes.max(1);
+        for pass in 1..=passes {
+            let model = if pass == passes { &self.last } else { &self.model };
             let start = found.as_ref().map_or_else(Rigid::identity, |r| r.target_from_source);
             let moved = source.transformed(&start);
-            let answer = self.pass(&[(&moved, &target)]).pop().flatten();
+            let answer = self.pass(model, &[(&moved, &target)]).pop().flatten();
             let answer = answer.ok_or_else(|| {
                 RegisterError::NoPose(
                     "the network's output is not finite; are the coordinates extreme?".into(),

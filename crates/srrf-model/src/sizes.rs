@@ -66,7 +66,11 @@ impl SrrfConfig {
     pub fn check(&self) -> Result<(), WrongSize> {
         check_sem(&self.sem)?;
         check_branch("dense", &self.dense)?;
-        check_branch("skeleton", &self.skeleton)
+        check_branch("skeleton", &self.skeleton)?;
+        if self.inference.passes == 0 {
+            return wrong("inference.passes".into(), "must be 1 or more");
+        }
+        Ok(())
     }
 }
 

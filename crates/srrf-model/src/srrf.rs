@@ -7,6 +7,7 @@ use srrf_cloud::profile::stage;
 
 use crate::branch::{Branch, BranchConfig, BranchOutput};
 use crate::geometry::HostClouds;
+use crate::inference::InferenceConfig;
 use crate::integration::{Fusion, IntegrationConfig};
 use crate::layout::SrrfLayout;
 use crate::sem::{Sem, SemConfig, Skeleton};
@@ -24,6 +25,9 @@ pub struct SrrfConfig {
     pub skeleton: BranchConfig,
     /// The transformation integration.
     pub integration: IntegrationConfig,
+    /// How the trained network is used; training takes no notice of it.
+    #[serde(default, skip_serializing_if = "InferenceConfig::is_default")]
+    pub inference: InferenceConfig,
 }
 
 impl SrrfConfig {

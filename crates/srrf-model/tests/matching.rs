@@ -5,7 +5,7 @@ mod common;
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{DType, Device, Tensor};
 use common::{Numbers, difference, tensor, tensor64, values};
-use srrf_model::{MatchingConfig, SoftMatching, init, sinkhorn};
+use srrf_model::{Matches, MatchingConfig, SoftMatching, init, sinkhorn};
 
 const CLOUDS: usize = 3;
 const SOURCES: usize = 5;
@@ -125,5 +125,31 @@ fn gradients_are_those_of_finite_differences() {
         };
         let wanted = (moved(1e-5) - moved(-1e-5)) / 2e-5;
         assert!((gradient[i] - wanted).abs() < 1e-6, "{i}: {} {wanted}", gradient[i]);
+    }
+}
+
+#[test]
+fn the_best_match_is_the_target_point_with_the_greatest_probability() {
+    let device = Device::flex();
+    for config in [MatchingConfig::default(), BOTH] {
+        let run = |matches| {
+            matching(&config).with_matches(matches).forward(
+                tensor(&features(1, SOURCES), [CLOUDS, SOURCES, WIDTH], &device),
+                tensor(&features(2, TARGETS), [CLOUDS, TARGETS, WIDTH], &device),
+                tensor(&targets(), [CLOUDS, TARGETS, 3], &device),
+            )
+        };
+        let (mean, best) = (run(Matches::Mean), run(Matches::Best));
+        let probabilities = values(&mean.probabilities);
+        assert_eq!(probabilities, values(&best.probabilities), "only the points differ");
+        assert_eq!(mean.matched.map(|m| values(&m)), best.matched.map(|m| values(&m)));
+        let points = values(&best.points);
+        for (i, row) in probabilities.chunks(TARGETS).enumerate() {
+            let chosen = (0..TARGETS).fold(0, |best, j| if row[j] > row[best] { j } else { best });
+            let at = (i / SOURCES * TARGETS + chosen) * 3;
+            let wanted: Vec<f64> = targets()[at..at + 3].iter().map(|v| f64::from(*v as f32)).collect();
+            assert_eq!(points[3 * i..3 * i + 3], wanted, "point {i}");
+        }
+        assert!(difference(&points, &values(&mean.points)) > 0.01);
     }
 }

@@ -10,7 +10,7 @@ use common::Numbers;
 use nalgebra::Vector3;
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_model::{
-    BranchConfig, BranchOutput, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PairBatch,
+    BranchConfig, BranchOutput, InferenceConfig, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PairBatch,
     PfiConfig, SemConfig, SfeConfig, SkeletonLossConfig, Srrf, SrrfConfig, chamfer, correspondence_loss,
     init, registration_loss, skeleton_loss,
 };
@@ -50,6 +50,7 @@ fn config() -> SrrfConfig {
             skeleton_threshold: 0.05,
             sharpness: 1.0,
         },
+        inference: InferenceConfig::default(),
     }
 }
 

@@ -9,8 +9,10 @@ use std::collections::BTreeMap;
 use burn::tensor::Device;
 use common::{Numbers, difference, tiny, values};
 use nalgebra::Vector3;
-use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid};
-use srrf_model::{PairBatch, PairFrame, SrrfRegister, init, weights};
+use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, SoftMatch};
+use srrf_model::{
+    InferenceConfig, Matches, PairBatch, PairFrame, SrrfConfig, SrrfRegister, init, weights,
+};
 
 /// Far from the origin, as map coordinates in metres are.
 const UTM: [f64; 3] = [500_000.0, 4_500_000.0, 120.0];
@@ -108,8 +110,12 @@ fn batches_need_equal_numbers_of_points() {
 }
 
 fn network() -> SrrfRegister {
+    network_with(InferenceConfig::default())
+}
+
+fn network_with(inference: InferenceConfig) -> SrrfRegister {
     let device = Device::flex();
-    let config = tiny();
+    let config = SrrfConfig { inference, ..tiny() };
     let model = init::seeded(config.init(&device), 12);
     let bytes = weights::to_safetensors(&model, &config, "tiny", &BTreeMap::new()).unwrap();
     SrrfRegister::new(weights::from_safetensors(&bytes, "memory", &device).unwrap(), device)
@@ -276,4 +282,27 @@ fn more_points_than_the_network_takes_are_subsampled_and_passes_are_chained() {
         let chained = last.target_from_source.compose(&first);
         assert!(image_gap(&source, &branch.target_from_source, &chained) < 1e-9);
     }
+}
+
+#[test]
+fn the_header_says_how_the_network_is_used() {
+    let (source, target) = (cloud(25, 61), cloud(26, 61));
+    let last = InferenceConfig { passes: 3, last_tokens: Some(0), last_matches: Matches::Best };
+    let answer = network_with(last.clone()).register(&source, &target).unwrap();
+    assert_eq!((answer.iterations, answer.matches.len()), (3, 61), "all points are tokens");
+    // Every match is a target point.
+    let matched = |m: &SoftMatch| {
+        let near = |p: &&[f64; 3]| (0..3).all(|c| (p[c] - m.target[c]).abs() < 1e-5);
+        target.points().iter().any(|p| near(&p))
+    };
+    assert!(answer.matches.iter().all(matched));
+    // The passes before the last one take the mean, on as many tokens as the branch has.
+    let mut first = network_with(InferenceConfig::default());
+    let pose = first.register(&source, &target).unwrap().target_from_source;
+    let last = network_with(InferenceConfig { passes: 1, ..last });
+    let then = last.register(&source.transformed(&pose), &target).unwrap().target_from_source.compose(&pose);
+    assert!(image_gap(&source, &answer.target_from_source, &then) < 1e-9);
+    first.passes = 1;
+    let soft = first.register(&source, &target).unwrap();
+    assert!(soft.matches.len() < 61 && !soft.matches.iter().all(matched));
 }

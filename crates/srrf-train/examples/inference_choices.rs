@@ -2,7 +2,7 @@
 //! tokens, inlier test. The test split plays no part. The tables of docs/experiments.md come from
 //!
 //! ```sh
-//! cargo run -p srrf-train --example inference_choices -- configs/modelnet-small.toml WEIGHTS DATA
+//! cargo run -p srrf-train --example inference_choices -- configs/modelnet-small.toml WEIGHTS DATA [SEVERITIES]
 //! ```
 
 use std::path::Path;
@@ -11,7 +11,9 @@ use srrf_cloud::source::{Split, open};
 use srrf_cloud::{PointCloud, Register};
 use srrf_corrupt::{Pair, Severity};
 use srrf_eval::{PairError, Scores};
-use srrf_model::{InlierTest, SrrfRegister, device, keep_freed_memory, weights};
+use srrf_model::{
+    InferenceConfig, InlierTest, Matches, SrrfRegister, device, keep_freed_memory, weights,
+};
 use srrf_train::config::TrainConfig;
 use srrf_train::data::TrainingPairs;
 use srrf_train::step::Workers;
@@ -20,52 +22,71 @@ use srrf_train::step::Workers;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     keep_freed_memory();
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [config, weights_path, data] = arguments.as_slice() else {
-        return Err("usage: inference_choices CONFIG WEIGHTS DATA".into());
+    let (config, weights_path, data, severities) = match arguments.as_slice() {
+        [config, weights, data] => (config, weights, data, "3"),
+        [config, weights, data, severities] => (config, weights, data, severities.as_str()),
+        _ => return Err("usage: inference_choices CONFIG WEIGHTS DATA [SEVERITIES]".into()),
     };
     let config = <TrainConfig>::read(Path::new(config))?;
     let pairs = TrainingPairs::new(&config, open(Path::new(data), Split::Train)?)?;
-    let held_out: Vec<Pair> = pairs.validation(Severity::try_from(3)?)?;
+    let mut held_out: Vec<Pair> = Vec::new();
+    for severity in severities.split(',') {
+        held_out.extend(pairs.validation(Severity::try_from(severity.parse::<u8>()?)?)?);
+    }
     let workers = Workers::new(std::thread::available_parallelism().map_or(1, usize::from))?;
     println!(
-        "{}; {} pairs at severity 3; RMSE / MAE / median of R in degrees",
+        "{}; {} pairs at severity {severities}; RMSE / MAE / median of R in degrees",
         pairs.description(),
         held_out.len()
     );
     println!(
-        "| passes | tokens | inlier test | sharpness | dense | skeleton | fused | the better branch |\n\
-         |---|---|---|---|---|---|---|---|"
+        "| passes | tokens | last pass | inlier test | sharpness | dense | skeleton | fused | the better branch |\n\
+         |---|---|---|---|---|---|---|---|---|"
     );
     let (nearest, both, soft) = (InlierTest::Nearest, InlierTest::BothWays, InlierTest::SoftMatch);
-    for (passes, tokens, test, threshold, skeleton_threshold, sharpness) in [
-        (1, 256, nearest, 0.05, 0.05, 1.0),
-        (1, 256, nearest, 0.05, 0.05, 16.0),
-        (1, 256, both, 0.05, 0.04, 16.0),
-        (2, 256, nearest, 0.05, 0.05, 1.0),
-        (2, 256, nearest, 0.05, 0.05, 16.0),
-        (2, 256, nearest, 0.05, 0.05, 64.0),
-        (2, 256, nearest, 0.03, 0.03, 16.0),
-        (2, 256, nearest, 0.02, 0.02, 16.0),
-        (2, 256, nearest, 0.08, 0.08, 16.0),
-        (2, 256, soft, 0.05, 0.1, 1.0),
-        (3, 256, nearest, 0.05, 0.05, 16.0),
-        (2, 256, both, 0.05, 0.05, 4.0),
-        (2, 256, both, 0.05, 0.05, 16.0),
-        (2, 256, both, 0.05, 0.05, 64.0),
-        (2, 256, both, 0.05, 0.04, 16.0),
-        (2, 512, nearest, 0.05, 0.05, 16.0),
-        (2, 512, nearest, 0.05, 0.04, 16.0),
-        (2, 512, soft, 0.05, 0.05, 4.0),
-        (2, 512, both, 0.05, 0.05, 4.0),
-        (2, 512, both, 0.05, 0.05, 16.0),
-        (2, 512, both, 0.05, 0.047, 16.0),
-        (2, 512, both, 0.05, 0.045, 16.0),
-        (2, 512, both, 0.05, 0.04, 16.0),
-        (2, 512, both, 0.05, 0.03, 16.0),
-        (2, 512, both, 0.05, 0.04, 64.0),
-        (2, 512, both, 0.05, 0.03, 64.0),
-        (3, 512, both, 0.05, 0.04, 16.0),
-        (2, 768, both, 0.05, 0.04, 16.0),
+    // Number of passes, tokens in them, tokens and matches in the last one, inlier test.
+    let (mean, best) = (Matches::Mean, Matches::Best);
+    for (passes, tokens, (last_tokens, matches), test, threshold, skeleton_threshold, sharpness) in [
+        (1, 256, (256, mean), nearest, 0.05, 0.05, 1.0),
+        (1, 256, (256, mean), nearest, 0.05, 0.05, 16.0),
+        (1, 256, (256, mean), both, 0.05, 0.04, 16.0),
+        (2, 256, (256, mean), nearest, 0.05, 0.05, 1.0),
+        (2, 256, (256, mean), nearest, 0.05, 0.05, 16.0),
+        (2, 256, (256, mean), nearest, 0.05, 0.05, 64.0),
+        (2, 256, (256, mean), nearest, 0.03, 0.03, 16.0),
+        (2, 256, (256, mean), nearest, 0.02, 0.02, 16.0),
+        (2, 256, (256, mean), nearest, 0.08, 0.08, 16.0),
+        (2, 256, (256, mean), soft, 0.05, 0.1, 1.0),
+        (3, 256, (256, mean), nearest, 0.05, 0.05, 16.0),
+        (2, 256, (256, mean), both, 0.05, 0.05, 4.0),
+        (2, 256, (256, mean), both, 0.05, 0.05, 16.0),
+        (2, 256, (256, mean), both, 0.05, 0.05, 64.0),
+        (2, 256, (256, mean), both, 0.05, 0.04, 16.0),
+        (2, 512, (512, mean), nearest, 0.05, 0.05, 16.0),
+        (2, 512, (512, mean), nearest, 0.05, 0.04, 16.0),
+        (2, 512, (512, mean), soft, 0.05, 0.05, 4.0),
+        (2, 512, (512, mean), both, 0.05, 0.05, 4.0),
+        (2, 512, (512, mean), both, 0.05, 0.05, 16.0),
+        (2, 512, (512, mean), both, 0.05, 0.047, 16.0),
+        (2, 512, (512, mean), both, 0.05, 0.045, 16.0),
+        (2, 512, (512, mean), both, 0.05, 0.04, 16.0),
+        (2, 512, (512, mean), both, 0.05, 0.03, 16.0),
+        (2, 512, (512, mean), both, 0.05, 0.04, 64.0),
+        (2, 512, (512, mean), both, 0.05, 0.03, 64.0),
+        (3, 512, (512, mean), both, 0.05, 0.04, 16.0),
+        (2, 768, (768, mean), both, 0.05, 0.04, 16.0),
+        (1, 256, (256, best), both, 0.05, 0.03, 64.0),
+        (1, 512, (512, best), both, 0.05, 0.03, 64.0),
+        (2, 256, (512, best), both, 0.05, 0.03, 64.0),
+        (2, 256, (1024, best), both, 0.05, 0.03, 64.0),
+        (2, 512, (512, best), both, 0.05, 0.03, 64.0),
+        (2, 512, (1024, mean), both, 0.05, 0.03, 64.0),
+        (2, 512, (1024, best), both, 0.05, 0.03, 64.0),
+        (2, 512, (1024, best), both, 0.05, 0.05, 16.0),
+        (2, 512, (1024, best), both, 0.03, 0.03, 16.0),
+        (2, 512, (1024, best), both, 0.03, 0.03, 64.0),
+        (2, 512, (1024, best), both, 0.03, 0.02, 64.0),
+        (3, 256, (1024, best), both, 0.05, 0.03, 64.0),
     ] {
         let device = device("flex")?;
         let mut loaded = weights::load(Path::new(weights_path), &device)?;
@@ -74,11 +95,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         loaded.config.integration.sharpness = sharpness;
         loaded.config.integration.dense_threshold = threshold;
         loaded.config.integration.skeleton_threshold = skeleton_threshold;
-        let mut method = SrrfRegister::new(loaded, device);
-        method.passes = passes;
+        loaded.config.inference =
+            InferenceConfig { passes, last_tokens: Some(last_tokens), last_matches: matches };
+        let method = SrrfRegister::new(loaded, device);
         let rows = score(&method, &held_out, &workers)?;
         println!(
-            "| {passes} | {tokens} | {test:?} {threshold} {skeleton_threshold} | {sharpness} | {} |",
+            "| {passes} | {tokens} | {last_tokens} {matches:?} | {test:?} {threshold} {skeleton_threshold} | {sharpness} | {} |",
             rows.join(" | ")
         );
     }

@@ -58,7 +58,8 @@ pub struct TrainConfig<C: Trained = SrrfConfig> {
     #[serde(default)]
     pub start: Option<StartConfig>,
     /// Where the network runs (`flex`, `ndarray`, `wgpu`, `vulkan`, `cuda`, `libtorch`); `--device` comes before
-    /// it, and `flex` is used if neither is given. A run may go on on another device.
+    /// it, and `flex` is used if neither is given. `cuda:1` is the second of its kind; the shards of a batch go in
+    /// turn to the devices of a list, `cuda:0,cuda:1`. A run may go on on others.
     #[serde(default)]
     pub device: Option<String>,
     /// The shapes.
@@ -172,6 +173,11 @@ fn one() -> f64 {
     1.0
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the form that serde calls")]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
 fn default_crop_keep() -> f64 {
     0.7
 }
@@ -182,12 +188,16 @@ fn default_crop_keep() -> f64 {
 pub struct LossConfig {
     /// The skeleton losses.
     pub skeleton: SkeletonLossConfig,
+    /// Weight of `L_reg` of each branch; 1 is the paper. The other losses of a trained network are some ten times as
+    /// large.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub registration: f64,
     /// Weight of the correspondence loss of each branch; 0 is the paper.
     pub correspondence: f64,
     /// Weight of the matching loss of each branch ([`srrf_model::matching_loss`]); 0 is the paper.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub matching: f64,
-    /// Weight of `L_reg` of the fused pose, beside 1 for that of each branch. At 0 the integration is left
+    /// Weight of `L_reg` of the fused pose, beside `registration` for that of each branch. At 0 the integration is left
     /// out of the training step, which saves its inlier test; the branches learn from their own poses.
     #[serde(default = "one")]
     pub fused: f64,

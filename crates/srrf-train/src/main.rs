@@ -48,8 +48,8 @@ struct Arguments {
     /// Worker threads; changes the time, not the result [default: all cores].
     #[arg(long)]
     threads: Option<usize>,
-    /// Device: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda`, `libtorch` where built in [default: `device` of
-    /// the configuration, or flex].
+    /// Device: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda`, `libtorch` where built in; `cuda:0,cuda:1` trains on
+    /// two [default: `device` of the configuration, or flex].
     #[arg(long)]
     device: Option<String>,
     /// Print at the end what time each stage of the steps took, over all threads.
@@ -100,7 +100,7 @@ fn train<C: Trained>(arguments: Arguments) -> Result<ExitCode, Failure> {
     let usage = |e: &dyn std::fmt::Display| Failure(2, e.to_string());
     let mut config = TrainConfig::<C>::read(&arguments.config).map_err(|e| usage(&e))?;
     let name = arguments.device.or(config.device.take()).unwrap_or_else(|| "flex".into());
-    let device = srrf_model::device(&name).map_err(|e| usage(&e))?;
+    let devices = srrf_model::devices(&name).map_err(|e| usage(&e))?;
     config.device = Some(name.clone());
     let shapes = shapes(&config, arguments.data.as_deref()).map_err(|e| Failure(2, e))?;
     let options = RunOptions {
@@ -125,10 +125,11 @@ fn train<C: Trained>(arguments: Arguments) -> Result<ExitCode, Failure> {
     }
     tell(&format!("config {}, data {}", arguments.config.display(), shapes.description()));
     tell(&format!("run {}, device {}, {} threads", options.folder.display(), name, options.threads));
-    let ended = run(&config, &options, shapes, device, &stop).map_err(|e| {
+    let ended = run(&config, &options, shapes, devices, &stop).map_err(|e| {
         let input = matches!(
             e,
             RunError::Exists { .. }
+                | RunError::Devices { .. }
                 | RunError::Checkpoint(_)
                 | RunError::Start { .. }
                 | RunError::StartFile { .. }

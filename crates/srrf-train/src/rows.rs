@@ -4,7 +4,7 @@
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param, ParamId};
 use burn::optim::{GradientsParams, ModuleOptimizer};
-use burn::tensor::Tensor;
+use burn::tensor::{Device, Tensor};
 
 /// The parameters of a part as rows, each with its gradient if it has one.
 type Part = Vec<(Tensor<1>, Option<Tensor<1>>)>;
@@ -22,6 +22,11 @@ impl RowGradients {
             trained.then(|| Tensor::cat(filled.collect(), 0))
         };
         Self(Collector::of(network, gradients).into_iter().map(whole).collect())
+    }
+
+    /// The same numbers on another device.
+    pub fn to_device(self, device: &Device) -> Self {
+        Self(self.0.into_iter().map(|row| row.map(|row| row.to_device(device))).collect())
     }
 
     /// The mean, summed in the order given.
@@ -206,7 +211,6 @@ impl ModuleMapper for Spread {
 mod tests {
     use burn::nn::{Linear, LinearConfig};
     use burn::optim::AdamWConfig;
-    use burn::tensor::Device;
     use srrf_model::init;
     use srrf_model::weights::parameters;
 

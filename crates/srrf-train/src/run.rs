@@ -81,6 +81,17 @@ pub enum RunError {
         /// The weights, as the configuration names them.
         start: String,
     },
+    /// There are more devices than shards.
+    #[error(
+        "{devices} devices, and a batch has {shards} shards: the rest would stand still. Lower `optimizer.shard`, or \
+         name fewer devices"
+    )]
+    Devices {
+        /// Number of devices.
+        devices: usize,
+        /// Shards of a batch.
+        shards: usize,
+    },
     /// Losses or gradients stay non-finite.
     #[error(
         "the loss or its gradient was not finite in {0} steps in a row; the last checkpoint is from before. \
@@ -143,7 +154,7 @@ pub struct Ended {
 struct Run<'a, C: Trained> {
     config: &'a TrainConfig<C>,
     options: &'a RunOptions,
-    device: Device,
+    devices: Vec<Device>,
     pairs: Arc<TrainingPairs>,
     held_out: Vec<Pair>,
     workers: Workers,
@@ -155,7 +166,8 @@ struct Run<'a, C: Trained> {
     started: (Instant, f64, f64, f64),
 }
 
-/// Trains, from the start or from the checkpoint, until done, told to stop, or out of time.
+/// Trains, from the start or from the checkpoint, until done, told to stop, or out of time. Where there are several
+/// devices, the shards of a batch go to them in turn.
 ///
 /// # Errors
 /// [`RunError`]; the last checkpoint stays usable.
@@ -163,10 +175,10 @@ pub fn run<C: Trained>(
     config: &TrainConfig<C>,
     options: &RunOptions,
     shapes: Box<dyn ShapeSource>,
-    device: Device,
+    devices: Vec<Device>,
     stop: &AtomicBool,
 ) -> Result<Ended, RunError> {
-    let run = Run::open(config, options, shapes, device)?;
+    let run = Run::open(config, options, shapes, devices)?;
     if !on_accelerator(config) {
         return run.go(stop, None);
     }
@@ -249,8 +261,13 @@ impl<'a, C: Trained> Run<'a, C> {
         config: &'a TrainConfig<C>,
         options: &'a RunOptions,
         shapes: Box<dyn ShapeSource>,
-        device: Device,
+        devices: Vec<Device>,
     ) -> Result<Self, RunError> {
+        let device = devices.first().ok_or(StepError::NoDevice)?;
+        let shards = config.optimizer.shards();
+        if devices.len() > shards {
+            return Err(RunError::Devices { devices: devices.len(), shards });
+        }
         let folder = &options.folder;
         let io = |path: &Path, source| RunError::Io { path: path.to_path_buf(), source };
         std::fs::create_dir_all(folder).map_err(|e| io(folder, e))?;
@@ -259,7 +276,7 @@ impl<'a, C: Trained> Run<'a, C> {
                 let _ = std::fs::remove_file(folder.join(name));
             }
         }
-        let found = checkpoint::load(folder, config, optimizer(&config.optimizer), &device)?;
+        let found = checkpoint::load(folder, config, optimizer(&config.optimizer), device)?;
         let (model, optimizer, progress) = match found {
             Some((_, _, progress)) if options.existing == Existing::Refuse => {
                 return Err(RunError::Exists { path: folder.clone(), step: progress.step });
@@ -267,8 +284,8 @@ impl<'a, C: Trained> Run<'a, C> {
             Some(found) => found,
             None => {
                 let model = match &config.start {
-                    Some(start) => starting_model(start, config, &device)?,
-                    None => init::seeded(config.network.init(&device), config.seed),
+                    Some(start) => starting_model(start, config, device)?,
+                    None => init::seeded(config.network.init(device), config.seed),
                 };
                 (model.valid(), optimizer(&config.optimizer), Progress::default())
             }
@@ -283,7 +300,6 @@ impl<'a, C: Trained> Run<'a, C> {
         let held_out = pairs.validation(severity).map_err(StepError::from)?;
         let plan = Plan::new(config, pairs.epoch_length());
         let log = Log::open(folder, progress.step).map_err(|e| io(folder, e))?;
-        let shards = config.optimizer.shards();
         let workers = match on_accelerator(config) {
             true => Workers::wide(shards.min(options.threads), options.threads)?,
             false => Workers::new(options.threads)?,
@@ -292,7 +308,7 @@ impl<'a, C: Trained> Run<'a, C> {
         Ok(Self {
             config,
             options,
-            device,
+            devices,
             pairs,
             held_out,
             workers,
@@ -313,7 +329,7 @@ impl<'a, C: Trained> Run<'a, C> {
     fn step(&mut self, step: usize, rate: f64, ahead: Option<&AheadOf<C>>) -> Result<Losses, RunError> {
         let config = self.config;
         let stage = &config.stages[self.plan.stage(step)];
-        let context = StepContext { config, stage, pairs: &self.pairs, device: &self.device, ahead };
+        let context = StepContext { config, stage, pairs: &self.pairs, devices: &self.devices, ahead };
         let mut outcome = gradient(&context, &self.model, step, &self.workers)?;
         if !outcome.norm.is_finite() {
             self.progress.skipped += 1;
@@ -338,7 +354,7 @@ impl<'a, C: Trained> Run<'a, C> {
         let network = &self.config.network;
         // A GPU takes a whole shard at a time, in the shapes of training.
         let chunk = if on_accelerator(self.config) { self.config.optimizer.shard } else { CHUNK };
-        let result = validate(network, &self.model, &self.held_out, chunk, &self.device, &self.workers)?;
+        let result = validate(network, &self.model, &self.held_out, chunk, &self.devices[0], &self.workers)?;
         let step = self.progress.step;
         self.log.validation(step, self.plan.epochs(step), &result).map_err(|e| self.io(e))?;
         let value = C::ROWS.last().map_or(f64::NAN, |row| result.scores[row].rmse_r);

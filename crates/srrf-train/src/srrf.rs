@@ -129,7 +129,7 @@ fn branch_terms(
     translation: &Tensor<2>,
 ) {
     let (r, t) = (branch.rotation.clone(), branch.translation.clone());
-    terms.add(name, registration_loss(r, t, rotation.clone(), translation.clone()), 1.0);
+    terms.add(name, registration_loss(r, t, rotation.clone(), translation.clone()), losses.registration);
     let (points, matches) = (branch.source_points.clone(), branch.matches.clone());
     terms.add(
         correspondence,

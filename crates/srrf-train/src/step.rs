@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use burn::module::Module;
 use burn::tensor::Device;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -29,8 +30,9 @@ pub struct StepContext<'a, C: Trained = SrrfConfig> {
     pub stage: &'a StageConfig,
     /// The pairs.
     pub pairs: &'a TrainingPairs,
-    /// Device of the network, without autodiff.
-    pub device: &'a Device,
+    /// Where the network runs, without autodiff: the shards of a batch go to them in turn. The first one holds
+    /// the parameters and the optimiser.
+    pub devices: &'a [Device],
     /// Shards by number, where other threads make them; each worker makes its own otherwise.
     pub ahead: Option<&'a AheadOf<C>>,
 }
@@ -84,6 +86,9 @@ pub enum StepError {
     /// The pairs of a shard differ in their number of points.
     #[error("pairs {0}.. differ in their number of points")]
     Ragged(usize),
+    /// There is no device to run on.
+    #[error("no device was given")]
+    NoDevice,
     /// A worker thread panicked.
     #[error("a worker thread stopped; the message above says why")]
     Worker,
@@ -147,14 +152,20 @@ pub fn gradient<C: Trained>(
     workers: &Workers,
 ) -> Result<StepOutcome, StepError> {
     let shards = context.config.optimizer.shards();
-    let run = |i: usize| shard(context, model, step * shards + i);
+    let (first, others) = context.devices.split_first().ok_or(StepError::NoDevice)?;
+    let copies: Vec<C::Network> = others.iter().map(|device| model.clone().to_device(device)).collect();
+    let run = |i: usize| match i % context.devices.len() {
+        0 => shard(context, model, first, step * shards + i),
+        d => shard(context, &copies[d - 1], &others[d - 1], step * shards + i),
+    };
     let parts = workers.map(shards, run).ok_or(StepError::Worker)?;
 
     let mut rows = Vec::with_capacity(shards);
     let mut losses = Losses::new();
     for part in parts {
         let (gradients, part_losses) = part?;
-        rows.push(gradients);
+        // By the host's order, not by who is done first, so that the sum is the same in every run.
+        rows.push(if others.is_empty() { gradients } else { gradients.to_device(first) });
         for (name, value) in part_losses {
             *losses.entry(name).or_insert(0.0) += value / shards as f64;
         }
@@ -186,9 +197,10 @@ fn upload(pairs: &HostPairs, poses: &[Rigid], phase: f32, device: &Device) -> Sh
 fn shard<C: Trained>(
     context: &StepContext<C>,
     network: &C::Network,
+    device: &Device,
     number: usize,
 ) -> Result<(RowGradients, Losses), StepError> {
-    let StepContext { config, stage, pairs, device, ahead } = *context;
+    let StepContext { config, stage, pairs, ahead, .. } = *context;
     let prepared = match ahead {
         Some(ahead) => ahead.take(number).ok_or(StepError::Worker)?,
         None => prepare(config, stage, pairs, number),

@@ -139,13 +139,14 @@ fn pass(device: &Device, dtype: DType) -> (Numbers, Numbers) {
     (found, gradients.found)
 }
 
-/// The loss of each of five training steps, and what every parameter moved.
-fn train(device: &Device) -> (Vec<f64>, Vec<f64>) {
+/// The loss of each of five training steps, and what every parameter moved. The shards of a batch go to the devices
+/// in turn.
+fn train(devices: &[Device]) -> (Vec<f64>, Vec<f64>) {
     let config = config();
     let (pairs, workers) = (pairs(&config), Workers::new(2).unwrap());
     let stage = config.stages.iter().find(|stage| stage.registration).unwrap();
-    let context = StepContext { config: &config, stage, pairs: &pairs, device, ahead: None };
-    let mut model = network(&config, device).valid();
+    let context = StepContext { config: &config, stage, pairs: &pairs, devices, ahead: None };
+    let mut model = network(&config, &devices[0]).valid();
     let mut updater = Updater::new(optimizer(&config.optimizer), &model);
     let start = flat(&model);
     let mut losses = Vec::new();
@@ -199,10 +200,10 @@ fn agrees(name: &str, device: &Device, dtype: DType) {
     eprintln!("{name}: forward {forward:.1e}, gradients {backward:.1e}");
 }
 
-/// Holds five training steps on a device against flex.
-fn trains(name: &str, device: &Device) {
-    let (wanted, wanted_moved) = train(&Device::flex());
-    let (found, moved) = train(device);
+/// Holds five training steps on devices against flex.
+fn trains(name: &str, devices: &[Device]) {
+    let (wanted, wanted_moved) = train(&[Device::flex()]);
+    let (found, moved) = train(devices);
     let losses = found.iter().zip(&wanted).map(|(a, b)| ((a - b) / b).abs()).fold(0.0, f64::max);
     assert!(found.iter().all(|loss| loss.is_finite()) && losses <= LOSSES, "{name}: {found:?}, {wanted:?}");
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -219,7 +220,8 @@ fn suite(name: &str) {
     match srrf_model::device(name) {
         Ok(device) => {
             agrees(name, &device, DType::F32);
-            trains(name, &device);
+            trains(name, std::slice::from_ref(&device));
+            trains(&format!("{name} and flex by turns"), &[device, Device::flex()]);
         }
         Err(e) if required => panic!("{e}"),
         Err(e) => eprintln!("skipped: {e}"),
@@ -233,8 +235,14 @@ fn flex_with_burns_own_operations_in_f64_agrees() {
 
 #[test]
 fn five_steps_teach_something() {
-    let (losses, moved) = train(&Device::flex());
+    let (losses, moved) = train(&[Device::flex()]);
     assert!(losses.len() == STEPS && largest(&moved) > 1e-3, "{losses:?}");
+}
+
+#[test]
+fn shards_on_two_devices_give_the_steps_of_one() {
+    // A copy of the network for each, of the same kind here: the same bytes.
+    assert_eq!(train(&[Device::flex(), Device::flex()]), train(&[Device::flex()]));
 }
 
 #[cfg(feature = "ndarray")]

@@ -76,7 +76,7 @@ fn a_run_in_two_sessions_gives_the_same_weights() {
             say: |_| {},
         };
         let shapes = ProceduralShapes::new(config.seed, config.data.shapes, None).unwrap();
-        run(&config, &options, Box::new(shapes), Device::flex(), &AtomicBool::new(false)).unwrap()
+        run(&config, &options, Box::new(shapes), vec![Device::flex()], &AtomicBool::new(false)).unwrap()
     };
     assert!(!go("two", 1, Some(3)).complete);
     assert_eq!((go("two", 2, None).step, go("one", 1, None).step), (8, 8));

@@ -9,25 +9,29 @@ use burn::tensor::wgpu::WgpuBackend;
 use burn::tensor::{Device, Tensor};
 
 /// What opening each device gave: a runtime can be set up once only.
-static OPENED: Mutex<BTreeMap<&str, Result<Device, String>>> = Mutex::new(BTreeMap::new());
+static OPENED: Mutex<BTreeMap<(&str, usize), Result<Device, String>>> = Mutex::new(BTreeMap::new());
 
-/// The device of a name that is built in, or why it cannot serve.
-pub fn open(name: &'static str) -> Result<Device, String> {
+/// Number `index` of the devices of a name that is built in, or why it cannot serve.
+pub fn open(name: &'static str, index: usize) -> Result<Device, String> {
     let mut opened = OPENED.lock().map_err(|e| e.to_string())?;
-    opened.entry(name).or_insert_with(|| quietly(|| acquire(name)).and_then(|found| found)).clone()
+    let acquired = || quietly(|| acquire(name, index)).and_then(|found| found);
+    opened.entry((name, index)).or_insert_with(acquired).clone()
 }
 
 /// Sets the device up and sees whether it can add.
-fn acquire(name: &str) -> Result<Device, String> {
+fn acquire(name: &str, index: usize) -> Result<Device, String> {
     let device = match name {
+        "wgpu" | "vulkan" if index > 0 => {
+            return Err("of a graphics interface this program takes the first device only".into());
+        }
         #[cfg(feature = "wgpu")]
         "wgpu" => graphics(WgpuBackend::Auto)?,
         #[cfg(feature = "vulkan")]
         "vulkan" => graphics(WgpuBackend::Vulkan)?,
         #[cfg(feature = "cuda")]
-        "cuda" => Device::cuda(0),
+        "cuda" => Device::cuda(index),
         #[cfg(feature = "libtorch")]
-        "libtorch" => libtorch(),
+        "libtorch" => libtorch(index)?,
         _ => return Err("no such device".into()),
     };
     let sum = Tensor::<1>::from_floats([1.0, 2.0, 4.0], &device).sum();
@@ -38,16 +42,19 @@ fn acquire(name: &str) -> Result<Device, String> {
     }
 }
 
-/// LibTorch's first CUDA device, or the CPU where it has none.
+/// LibTorch's CUDA device of this number, or the CPU where it has none.
 #[cfg(feature = "libtorch")]
 #[allow(
     deprecated,
     reason = "Burn deprecates the backend; on one H100 it trains faster than its own kernels"
 )]
-fn libtorch() -> Device {
-    match tch::Cuda::is_available() {
-        true => Device::libtorch_cuda(0),
-        false => Device::libtorch(),
+fn libtorch(index: usize) -> Result<Device, String> {
+    match tch::Cuda::device_count() {
+        count if index >= 1.max(count as usize) => {
+            Err(format!("LibTorch sees {count} CUDA devices, and no number {index}"))
+        }
+        0 => Ok(Device::libtorch()),
+        _ => Ok(Device::libtorch_cuda(index)),
     }
 }
 

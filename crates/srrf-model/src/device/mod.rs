@@ -1,5 +1,6 @@
 //! Devices by name. Which ones a program has is settled when it is built, by the cargo features
 //! `ndarray`, `wgpu`, `vulkan`, `cuda` and `libtorch`; which of them runs the network, by `--device`.
+//! `cuda:1` is the second device of its kind, `cuda:0,cuda:1` a list for training on both.
 
 #[cfg(any(feature = "wgpu", feature = "cuda", feature = "libtorch"))]
 mod accelerator;
@@ -10,8 +11,11 @@ use burn::tensor::Device;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DeviceError {
     /// No device has this name.
-    #[error("no device is called `{0}`; there are {known}", known = NAMES.join(", "))]
+    #[error("no device is called `{0}`; there are {known}, and `cuda:1` for the second of a kind", known = NAMES.join(", "))]
     Unknown(String),
+    /// A list of devices that do not go together.
+    #[error("devices `{0}`: name devices of one kind, each once, such as `cuda:0,cuda:1`")]
+    List(String),
     /// This program was built without the device.
     #[error(
         "device `{0}` is not built in; build with `--features {0}` (docs/backends.md). This program has: {built_in}",
@@ -31,10 +35,11 @@ pub enum DeviceError {
 /// Names of all devices, built in or not.
 pub const NAMES: [&str; 6] = ["flex", "ndarray", "wgpu", "vulkan", "cuda", "libtorch"];
 
-/// Whether the device of this name computes on another processor than the host. `libtorch` counts as one,
-/// since it is there for CUDA.
+/// Whether the device of this name, or the first of this list, computes on another processor than the
+/// host. `libtorch` counts as one, since it is there for CUDA.
 pub fn is_accelerator(name: &str) -> bool {
-    !["flex", "ndarray"].contains(&name)
+    let kind = name.split([':', ',']).next();
+    !["flex", "ndarray"].map(Some).contains(&kind)
 }
 
 /// Names of the devices that this program was built with.
@@ -50,26 +55,52 @@ pub fn built_in() -> Vec<&'static str> {
     NAMES.into_iter().zip(built).filter_map(|(name, built)| built.then_some(name)).collect()
 }
 
-/// The device of a name, without autodiff. A GPU computes one small sum first, once a process, so that
-/// a missing driver is an error here and no panic later.
+/// The device of a name, without autodiff: `cuda` or `cuda:0` is the first of its kind, `cuda:1` the second. A GPU
+/// computes one small sum first, once a process, so that a missing driver is an error here and no panic later.
 ///
 /// # Errors
 /// [`DeviceError`] for a name that is none, a device that is not built in, and one that cannot serve on
 /// this machine.
 pub fn device(name: &str) -> Result<Device, DeviceError> {
-    let known = NAMES.into_iter().find(|known| *known == name);
-    let name = known.ok_or_else(|| DeviceError::Unknown(name.to_string()))?;
+    let (name, index) = parse(name)?;
     match name {
+        "flex" | "ndarray" if index > 0 => {
+            let reason = format!("it is the processor, and there is no number {index} of it");
+            Err(DeviceError::Unavailable { name, reason })
+        }
         "flex" => Ok(Device::flex()),
         #[cfg(feature = "ndarray")]
         #[allow(deprecated, reason = "Burn deprecates the backend; it stays supported here")]
         "ndarray" => Ok(Device::ndarray()),
         #[cfg(any(feature = "wgpu", feature = "cuda", feature = "libtorch"))]
         _ if built_in().contains(&name) => {
-            accelerator::open(name).map_err(|reason| DeviceError::Unavailable { name, reason })
+            accelerator::open(name, index).map_err(|reason| DeviceError::Unavailable { name, reason })
         }
         _ => Err(DeviceError::NotBuiltIn(name)),
     }
+}
+
+/// The devices of a list such as `cuda:0,cuda:1`, or of one name.
+///
+/// # Errors
+/// As [`device`]; [`DeviceError::List`] where they are of several kinds, or one is named twice.
+pub fn devices(list: &str) -> Result<Vec<Device>, DeviceError> {
+    let parsed: Vec<(&str, usize)> = list.split(',').map(|name| parse(name.trim())).collect::<Result<_, _>>()?;
+    let twice = |i: usize| parsed[..i].contains(&parsed[i]);
+    if parsed.iter().any(|(kind, _)| *kind != parsed[0].0) || (0..parsed.len()).any(twice) {
+        return Err(DeviceError::List(list.to_string()));
+    }
+    list.split(',').map(|name| device(name.trim())).collect()
+}
+
+/// `NAME` or `NAME:INDEX`.
+fn parse(name: &str) -> Result<(&'static str, usize), DeviceError> {
+    let unknown = || DeviceError::Unknown(name.to_string());
+    let (kind, index) = match name.split_once(':') {
+        Some((kind, index)) => (kind, index.parse().map_err(|_| unknown())?),
+        None => (name, 0),
+    };
+    NAMES.into_iter().find(|known| *known == kind).map(|kind| (kind, index)).ok_or_else(unknown)
 }
 
 #[cfg(test)]
@@ -95,7 +126,22 @@ mod tests {
     fn an_error_names_the_way_out() {
         let said = device("abacus").unwrap_err().to_string();
         assert!(NAMES.iter().all(|name| said.contains(name)), "{said}");
+        assert!(device("flex:x").is_err() && device("flex:-1").is_err() && device(":0").is_err());
+        let said = device("flex:1").unwrap_err().to_string();
+        assert!(said.contains("no number 1"), "{said}");
         let said = DeviceError::NotBuiltIn("cuda").to_string();
         assert!(said.contains("--features cuda") && said.contains("flex"), "{said}");
+    }
+
+    #[test]
+    fn a_list_names_devices_of_one_kind_once() {
+        assert_eq!(devices("flex").unwrap(), [Device::flex()]);
+        assert_eq!(devices("flex:0").unwrap(), [Device::flex()]);
+        for list in ["flex,flex:0", "flex,ndarray", "cuda:0,cuda:1,cuda:0", "cuda:0,libtorch:1"] {
+            let said = devices(list).unwrap_err().to_string();
+            assert!(said.contains(list) && said.contains("`cuda:0,cuda:1`"), "{said}");
+        }
+        assert!(matches!(devices("flex,"), Err(DeviceError::Unknown(name)) if name.is_empty()));
+        assert!(is_accelerator("cuda:1") && is_accelerator("libtorch:0,libtorch:1") && !is_accelerator("flex:0"));
     }
 }

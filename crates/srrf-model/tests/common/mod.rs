@@ -4,7 +4,7 @@
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use srrf_model::{
-    BranchConfig, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PfiConfig, SemConfig,
+    BranchConfig, InferenceConfig, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PfiConfig, SemConfig,
     SfeConfig, SrrfConfig,
 };
 
@@ -108,5 +108,6 @@ pub fn tiny() -> SrrfConfig {
             skeleton_threshold: 0.1,
             sharpness: 1.0,
         },
+        inference: InferenceConfig::default(),
     }
 }

@@ -126,7 +126,7 @@ impl Bench {
             config: &self.config,
             stage,
             pairs: &self.pairs,
-            device: &self.device,
+            devices: std::slice::from_ref(&self.device),
             ahead: None,
         };
         let workers = Workers::new(arguments.threads)?;
