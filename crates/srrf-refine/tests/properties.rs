@@ -6,7 +6,7 @@ use nalgebra::{Matrix6, Vector3};
 use srrf_cloud::shapes::ProceduralShapes;
 use srrf_cloud::{CloudError, EulerXyz, PointCloud, Register, RegisterError, Registration, Rigid};
 use srrf_corrupt::{CorruptionKind, Pair, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream};
-use srrf_refine::{RefineConfig, RefineError, RefineTarget, Refined, Verdict, refine};
+use srrf_refine::{Deformed, RefineConfig, RefineError, RefineTarget, Refined, Verdict, refine};
 
 fn motion(angles_deg: [f64; 3], translation: [f64; 3]) -> Rigid {
     Rigid { rotation: EulerXyz::from_deg(angles_deg).to_matrix(), translation: translation.into() }
@@ -124,6 +124,34 @@ fn deformation_is_told_from_noise() {
             let found = refine(&pair.source, &pair.target, &[("start", off(&pair))], &config).unwrap();
             assert_eq!(found.verdict, verdict, "{kind} {item}: {:?}", found.residuals);
         }
+    }
+}
+
+#[test]
+fn a_start_that_knows_shapes_is_not_left_by_a_wide_turn_without_need() {
+    let full = RefineConfig { check_deformation: false, ..RefineConfig::default() };
+    let halfway = RefineConfig { deformed: Deformed::Halfway, ..RefineConfig::default() };
+    let start = |pair: &Pair, deg| motion(deg, [0.0; 3]).compose(&pair.target_from_source);
+    let mut wandered = 0;
+    for item in 13..17 {
+        let pair = pair(CorruptionKind::Shear, 5, 1024, item);
+        let start = start(&pair, [34.0, -22.0, 19.0]);
+        let by = |config| refine(&pair.source, &pair.target, &[("start", start)], config).unwrap();
+        let turn = by(&full).target_from_source.angle_to_deg(&start);
+        let (kept, mean) = (by(&RefineConfig::default()), by(&halfway));
+        if turn > 20.0 && kept.verdict == Verdict::Deformed {
+            assert_eq!(kept.target_from_source, start, "{item}");
+            wandered += usize::from(mean.verdict == Verdict::Rigid);
+        }
+    }
+    assert!(wandered > 0, "some of these pairs have residuals like rigid ones");
+    // Where the fit is good, as far a turn is taken.
+    for kind in [CorruptionKind::Gaussian, CorruptionKind::Uniform, CorruptionKind::Cutout] {
+        let pair = pair(kind, 4, 1024, 3);
+        let start = start(&pair, [24.0, -12.0, 9.0]);
+        let found = refine(&pair.source, &pair.target, &[("start", start)], &RefineConfig::default()).unwrap();
+        assert_eq!(found.verdict, Verdict::Rigid, "{kind}");
+        assert!(found.target_from_source.angle_to_deg(&pair.target_from_source) < 1.0, "{kind}");
     }
 }
 
