@@ -19,7 +19,8 @@ use crate::{Deformed, Metric, RefineConfig, RefineError};
 /// density_dec and cutout with two samplings; 9 of 10 sheared or warped pairs are above (`docs/experiments.md`).
 const DEFORMED_CORRELATION: f64 = 0.09;
 /// So does a turn by more than this away from the start of a method that knows shapes: over the 1,536 rigid pairs of the same
-/// examples the refinement turned no start by more than 14.5 degrees, and from sheared ones it wanders off.
+/// examples the refinement turned no start by more than 14.5 degrees, and sheared boxes fit as well in a wrong pose as noisy ones
+/// in the right one, so that no support speaks for it.
 const WANDERED_DEG: f64 = 20.0;
 /// Not so where half of the matches are closer than this, in point spacings: the clouds then share
 /// points, and what is left over are holes.
@@ -137,7 +138,7 @@ impl Run<'_> {
         if self.config.check_deformation && small && deformed {
             let cautious = self.cautious_run(&start);
             // A pose that brings so much more together is right, whatever the residuals look like.
-            if support < self.support(&cautious.pose) + CLEARLY_BETTER {
+            if wandered || support < self.support(&cautious.pose) + CLEARLY_BETTER {
                 verdict = Verdict::Deformed;
                 let near = |s: &&StartSupport| s.given.angle_to_deg(&best.given) < SAME_DEG;
                 kept = starts.iter().find(near).unwrap_or(best).given;

@@ -128,30 +128,26 @@ fn deformation_is_told_from_noise() {
 }
 
 #[test]
-fn a_start_that_knows_shapes_is_not_left_by_a_wide_turn_without_need() {
-    let full = RefineConfig { check_deformation: false, ..RefineConfig::default() };
-    let halfway = RefineConfig { deformed: Deformed::Halfway, ..RefineConfig::default() };
-    let start = |pair: &Pair, deg| motion(deg, [0.0; 3]).compose(&pair.target_from_source);
-    let mut wandered = 0;
-    for item in 13..17 {
-        let pair = pair(CorruptionKind::Shear, 5, 1024, item);
-        let start = start(&pair, [34.0, -22.0, 19.0]);
-        let by = |config| refine(&pair.source, &pair.target, &[("start", start)], config).unwrap();
-        let turn = by(&full).target_from_source.angle_to_deg(&start);
-        let (kept, mean) = (by(&RefineConfig::default()), by(&halfway));
-        if turn > 20.0 && kept.verdict == Verdict::Deformed {
-            assert_eq!(kept.target_from_source, start, "{item}");
-            wandered += usize::from(mean.verdict == Verdict::Rigid);
-        }
-    }
-    assert!(wandered > 0, "some of these pairs have residuals like rigid ones");
-    // Where the fit is good, as far a turn is taken.
-    for kind in [CorruptionKind::Gaussian, CorruptionKind::Uniform, CorruptionKind::Cutout] {
+fn a_start_that_knows_shapes_is_not_left_by_a_wide_turn_unless_points_coincide() {
+    let known = RefineConfig::default();
+    let unknown = RefineConfig { deformed: Deformed::Halfway, ..known };
+    let turned = |start: Rigid, pair: &Pair, config| {
+        let found = refine(&pair.source, &pair.target, &[("start", start)], config).unwrap();
+        (found.verdict, found.target_from_source.angle_to_deg(&start))
+    };
+    // A sheared box fits well where it is wrong by 30 degrees.
+    let sheared = pair(CorruptionKind::Shear, 5, 1024, 7);
+    let start = off(&sheared);
+    let (verdict, turn) = turned(start, &sheared, &unknown);
+    assert!(verdict == Verdict::Rigid && turn > 25.0, "{verdict:?} {turn}");
+    assert_eq!(turned(start, &sheared, &known), (Verdict::Deformed, 0.0));
+    // A start that is that far off is left where points coincide, or where it knew no shapes.
+    for (kind, config) in [(CorruptionKind::Cutout, &known), (CorruptionKind::Gaussian, &unknown)] {
         let pair = pair(kind, 4, 1024, 3);
-        let start = start(&pair, [24.0, -12.0, 9.0]);
-        let found = refine(&pair.source, &pair.target, &[("start", start)], &RefineConfig::default()).unwrap();
-        assert_eq!(found.verdict, Verdict::Rigid, "{kind}");
-        assert!(found.target_from_source.angle_to_deg(&pair.target_from_source) < 1.0, "{kind}");
+        let start = motion([24.0, -12.0, 9.0], [0.0; 3]).compose(&pair.target_from_source);
+        let (verdict, turn) = turned(start, &pair, config);
+        let far = start.angle_to_deg(&pair.target_from_source);
+        assert!(verdict == Verdict::Rigid && far > 25.0 && (turn - far).abs() < 1.0, "{kind}: {turn}, {far}");
     }
 }
 

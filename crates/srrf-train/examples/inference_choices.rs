@@ -86,7 +86,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         (2, 512, (1024, best), both, 0.03, 0.03, 16.0),
         (2, 512, (1024, best), both, 0.03, 0.03, 64.0),
         (2, 512, (1024, best), both, 0.03, 0.02, 64.0),
+        (2, 512, (1024, best), both, 0.03, 0.01, 256.0),
+        (2, 512, (768, best), both, 0.05, 0.03, 64.0),
+        (3, 256, (512, best), both, 0.05, 0.03, 64.0),
         (3, 256, (1024, best), both, 0.05, 0.03, 64.0),
+        (3, 256, (1024, best), both, 0.03, 0.03, 16.0),
+        (3, 256, (1024, best), both, 0.02, 0.015, 256.0),
+        (3, 128, (1024, best), both, 0.05, 0.03, 64.0),
+        (4, 256, (1024, best), both, 0.05, 0.03, 64.0),
+        (5, 256, (1024, best), both, 0.05, 0.03, 64.0),
     ] {
         let device = device("flex")?;
         let mut loaded = weights::load(Path::new(weights_path), &device)?;
