@@ -10,9 +10,9 @@ use common::Numbers;
 use nalgebra::Vector3;
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_model::{
-    BranchConfig, BranchOutput, InferenceConfig, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PairBatch,
-    PfiConfig, SemConfig, SfeConfig, SkeletonLossConfig, Srrf, SrrfConfig, chamfer, correspondence_loss,
-    init, registration_loss, skeleton_loss,
+    BranchConfig, BranchOutput, InferenceConfig, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig,
+    PairBatch, PfiConfig, SemConfig, SfeConfig, SkeletonLossConfig, Srrf, SrrfConfig, chamfer,
+    correspondence_loss, init, registration_loss, skeleton_loss,
 };
 
 const PAIRS: usize = 8;

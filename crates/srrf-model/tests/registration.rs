@@ -10,9 +10,7 @@ use burn::tensor::Device;
 use common::{Numbers, difference, tiny, values};
 use nalgebra::Vector3;
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, SoftMatch};
-use srrf_model::{
-    InferenceConfig, Matches, PairBatch, PairFrame, SrrfConfig, SrrfRegister, init, weights,
-};
+use srrf_model::{InferenceConfig, Matches, PairBatch, PairFrame, SrrfConfig, SrrfRegister, init, weights};
 
 /// Far from the origin, as map coordinates in metres are.
 const UTM: [f64; 3] = [500_000.0, 4_500_000.0, 120.0];

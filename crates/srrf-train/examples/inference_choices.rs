@@ -11,9 +11,7 @@ use srrf_cloud::source::{Split, open};
 use srrf_cloud::{PointCloud, Register};
 use srrf_corrupt::{Pair, Severity};
 use srrf_eval::{PairError, Scores};
-use srrf_model::{
-    InferenceConfig, InlierTest, Matches, SrrfRegister, device, keep_freed_memory, weights,
-};
+use srrf_model::{InferenceConfig, InlierTest, Matches, SrrfRegister, device, keep_freed_memory, weights};
 use srrf_train::config::TrainConfig;
 use srrf_train::data::TrainingPairs;
 use srrf_train::step::Workers;

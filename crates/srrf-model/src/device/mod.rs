@@ -85,7 +85,8 @@ pub fn device(name: &str) -> Result<Device, DeviceError> {
 /// # Errors
 /// As [`device`]; [`DeviceError::List`] where they are of several kinds, or one is named twice.
 pub fn devices(list: &str) -> Result<Vec<Device>, DeviceError> {
-    let parsed: Vec<(&str, usize)> = list.split(',').map(|name| parse(name.trim())).collect::<Result<_, _>>()?;
+    let parsed: Vec<(&str, usize)> =
+        list.split(',').map(|name| parse(name.trim())).collect::<Result<_, _>>()?;
     let twice = |i: usize| parsed[..i].contains(&parsed[i]);
     if parsed.iter().any(|(kind, _)| *kind != parsed[0].0) || (0..parsed.len()).any(twice) {
         return Err(DeviceError::List(list.to_string()));
@@ -142,6 +143,8 @@ mod tests {
             assert!(said.contains(list) && said.contains("`cuda:0,cuda:1`"), "{said}");
         }
         assert!(matches!(devices("flex,"), Err(DeviceError::Unknown(name)) if name.is_empty()));
-        assert!(is_accelerator("cuda:1") && is_accelerator("libtorch:0,libtorch:1") && !is_accelerator("flex:0"));
+        assert!(
+            is_accelerator("cuda:1") && is_accelerator("libtorch:0,libtorch:1") && !is_accelerator("flex:0")
+        );
     }
 }

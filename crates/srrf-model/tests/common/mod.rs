@@ -4,8 +4,8 @@
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use srrf_model::{
-    BranchConfig, InferenceConfig, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PfiConfig, SemConfig,
-    SfeConfig, SrrfConfig,
+    BranchConfig, InferenceConfig, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PfiConfig,
+    SemConfig, SfeConfig, SrrfConfig,
 };
 
 /// splitmix64: the state grows by a constant, each output is a hash of it.
