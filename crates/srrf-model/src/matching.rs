@@ -5,7 +5,6 @@ use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::rows;
 use crate::inference::Matches;
 
 /// Scores beyond this are cut before the exponential.
@@ -136,11 +135,8 @@ impl SoftMatching {
 
 /// The most probable target point of each source point: `[batch, n, 3]`.
 fn most_probable(probabilities: &Tensor<3>, target_points: Tensor<3>) -> Tensor<3> {
-    let [batch, n, m] = probabilities.dims();
-    let best = probabilities.clone().argmax(2).try_to_vec_as::<i64>().unwrap_or_default();
-    let row = |(i, best): (usize, i64)| (i / n * m) as i64 + best;
-    let best: Vec<i64> = best.into_iter().enumerate().map(row).collect();
-    rows(target_points.reshape([batch * m, 3]), &best).reshape([batch, n, 3])
+    let best = probabilities.clone().argmax(2); // [batch, n, 1]
+    target_points.gather(1, best.repeat_dim(2, 3))
 }
 
 /// `m = softmax(scores)` over the target points, and `yhat = m Y`.

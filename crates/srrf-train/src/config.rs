@@ -188,8 +188,8 @@ fn default_crop_keep() -> f64 {
 pub struct LossConfig {
     /// The skeleton losses.
     pub skeleton: SkeletonLossConfig,
-    /// Weight of `L_reg` of each branch; 1 is the paper. The other losses of a trained network are some ten times as
-    /// large.
+    /// Weight of `L_reg` of each branch; 1 is the paper. The other losses of a trained network are ten to a hundred
+    /// times as large.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub registration: f64,
     /// Weight of the correspondence loss of each branch; 0 is the paper.
