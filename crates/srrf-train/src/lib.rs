@@ -14,5 +14,6 @@ pub mod rows;
 pub mod run;
 pub mod schedule;
 mod srrf;
+mod start;
 pub mod step;
 pub mod validate;

@@ -11,12 +11,12 @@ use burn::tensor::Device;
 use srrf_cloud::profile;
 use srrf_cloud::source::ShapeSource;
 use srrf_corrupt::{Pair, Severity};
-use srrf_model::weights::{parameters, to_safetensors, with_parameters, write_atomically};
+use srrf_model::weights::{to_safetensors, write_atomically};
 use srrf_model::{init, is_accelerator};
 
 use crate::ahead::{Ahead, Closing};
 use crate::checkpoint::{self, CheckpointError, Progress};
-use crate::config::{DataSource, StartConfig, TrainConfig};
+use crate::config::{DataSource, TrainConfig};
 use crate::data::TrainingPairs;
 use crate::log::{Log, progress_bar, summary};
 use crate::network::Trained;
@@ -24,6 +24,7 @@ use crate::optimizer::optimizer;
 use crate::resources::cpu_seconds;
 use crate::rows::Updater;
 use crate::schedule::Plan;
+use crate::start::starting_model;
 use crate::step::{AheadOf, Losses, StepContext, StepError, Workers, gradient, prepare};
 use crate::validate::{CHUNK, ValidateError, Validation, validate};
 
@@ -416,38 +417,6 @@ impl<'a, C: Trained> Run<'a, C> {
     fn io(&self, source: std::io::Error) -> RunError {
         RunError::Io { path: self.options.folder.clone(), source }
     }
-}
-
-/// The weights that `start` of the configuration names. Parameters that only this network has keep their
-/// initial values.
-fn starting_model<C: Trained>(
-    start: &StartConfig,
-    config: &TrainConfig<C>,
-    device: &Device,
-) -> Result<C::Network, RunError> {
-    let fresh = init::seeded(config.network.init(device), config.seed);
-    let mut values = parameters(&fresh);
-    let parts: Vec<(&str, &String)> = match start {
-        StartConfig::Whole(start) => vec![("", start)],
-        StartConfig::Parts(parts) => parts.iter().map(|(part, start)| (part.as_str(), start)).collect(),
-    };
-    for (part, start) in parts {
-        let wrong = |name: String| RunError::Start { start: start.clone(), name };
-        let within = |name: &String| part.is_empty() || name.split('.').next() == Some(part);
-        let unread = |source| RunError::StartFile { start: start.clone(), source };
-        let loaded = C::start(start, device).map_err(unread)?;
-        let theirs: Vec<_> = parameters(&loaded).into_iter().filter(|(name, _)| within(name)).collect();
-        if theirs.is_empty() {
-            return Err(wrong(part.to_string()));
-        }
-        for (name, theirs) in theirs {
-            match values.get_mut(&name) {
-                Some(ours) if ours.0 == theirs.0 => *ours = theirs,
-                _ => return Err(wrong(name)),
-            }
-        }
-    }
-    with_parameters(fresh, values).map_err(|(name, _)| RunError::Start { start: format!("{start:?}"), name })
 }
 
 fn merge((sums, count): &mut (Losses, usize), losses: Losses) {

@@ -63,6 +63,11 @@ pub fn built_in() -> Vec<&'static str> {
 /// this machine.
 pub fn device(name: &str) -> Result<Device, DeviceError> {
     let (name, index) = parse(name)?;
+    open(name, index)
+}
+
+/// Number `index` of the devices of a name of [`NAMES`].
+fn open(name: &'static str, index: usize) -> Result<Device, DeviceError> {
     match name {
         "flex" | "ndarray" if index > 0 => {
             let reason = format!("it is the processor, and there is no number {index} of it");
@@ -91,7 +96,7 @@ pub fn devices(list: &str) -> Result<Vec<Device>, DeviceError> {
     if parsed.iter().any(|(kind, _)| *kind != parsed[0].0) || (0..parsed.len()).any(twice) {
         return Err(DeviceError::List(list.to_string()));
     }
-    list.split(',').map(|name| device(name.trim())).collect()
+    parsed.into_iter().map(|(name, index)| open(name, index)).collect()
 }
 
 /// `NAME` or `NAME:INDEX`.
