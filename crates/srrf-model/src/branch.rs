@@ -12,6 +12,7 @@ use crate::integration::BranchPose;
 use crate::layout::BranchLayout;
 use crate::matching::{MatchingConfig, SoftMatching};
 use crate::pfi::{Pfi, PfiConfig};
+use crate::prior::PositionPrior;
 use crate::procrustes::{procrustes, weighted_procrustes};
 use crate::sfe::{Sfe, SfeConfig};
 use crate::timing::timed;
@@ -110,7 +111,7 @@ impl Branch {
     pub fn forward(&self, source: Tensor<3>, target: Tensor<3>, phase: f32) -> BranchOutput {
         let clouds = Tensor::cat(vec![source, target], 0);
         let layout = self.layout(&HostClouds::read(&clouds), phase);
-        self.forward_with(clouds, &layout)
+        self.forward_with(clouds, &layout, None)
     }
 
     /// The layout of `clouds`, sources and then targets.
@@ -118,11 +119,16 @@ impl Branch {
         BranchLayout::new(clouds, self.tokens, self.sfe.neighbours(), phase)
     }
 
-    /// As [`Branch::forward`], of clouds whose layout is known.
+    /// As [`Branch::forward`], of clouds whose layout is known, and with a prior on where matches lie.
     ///
     /// # Shapes
     /// - `clouds`: `[2 batch, points, 3]`, sources and then targets
-    pub fn forward_with(&self, clouds: Tensor<3>, layout: &BranchLayout) -> BranchOutput {
+    pub fn forward_with(
+        &self,
+        clouds: Tensor<3>,
+        layout: &BranchLayout,
+        prior: Option<&PositionPrior>,
+    ) -> BranchOutput {
         let [both, points, _] = clouds.dims();
         let (batch, n) = (both / 2, layout.per_cloud);
         let tokens = match &layout.tokens {
@@ -135,8 +141,10 @@ impl Branch {
         let half = |x: &Tensor<3>, which: usize| x.clone().narrow(0, which * batch, batch);
         let (source_points, target_points) = (half(&tokens, 0), half(&tokens, 1));
         let phi = |which: usize| half(&features, which);
-        let matches =
-            timed("matching", &device, || self.matching.forward(phi(0), phi(1), target_points.clone()));
+        let log_prior = prior.map(|prior| prior.log_density(source_points.clone(), target_points.clone()));
+        let matches = timed("matching", &device, || {
+            self.matching.forward(phi(0), phi(1), target_points.clone(), log_prior)
+        });
         let (rotation, translation) =
             timed("svd", &device, || match self.weights(phi(0), matches.matched.clone()) {
                 Some(weights) => weighted_procrustes(source_points.clone(), matches.points.clone(), weights),

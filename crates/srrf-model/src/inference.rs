@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// How a trained network is used: chosen on validation pairs after the training, and kept in the header of the
 /// weights. The paper's use is [`InferenceConfig::paper`].
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct InferenceConfig {
     /// How often the network is applied, each time to the source as the last pose left it. Default: 2, which
@@ -15,6 +15,11 @@ pub struct InferenceConfig {
     pub last_tokens: Option<usize>,
     /// Where the points of the dense branch go in the last pass.
     pub last_matches: Matches,
+    /// Standard deviation, along each axis and in network units (clouds of a root mean square radius of 0.6), of how
+    /// far from where the pass before left a point its match is expected, in the passes after the first one (see
+    /// [`PositionPrior`](crate::PositionPrior)). Default: none, all places are as likely.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<f64>,
 }
 
 /// Where a source point goes.
@@ -31,7 +36,7 @@ pub enum Matches {
 
 impl Default for InferenceConfig {
     fn default() -> Self {
-        Self { passes: 2, last_tokens: None, last_matches: Matches::Mean }
+        Self { passes: 2, last_tokens: None, last_matches: Matches::Mean, prior: None }
     }
 }
 

@@ -4,6 +4,7 @@
 
 use crate::branch::BranchConfig;
 use crate::geometry::{HostClouds, farthest_points, flat_indices, k_nearest, token_rows};
+use crate::prior::PositionPrior;
 use crate::sem::{LevelConfig, SemConfig};
 use crate::srrf::SrrfConfig;
 
@@ -17,6 +18,8 @@ pub struct SrrfLayout {
     pub dense: BranchLayout,
     /// In [0, 1): where along the curve the tokens of the skeleton branch start, if not all are tokens.
     pub phase: f32,
+    /// Where matches are to be expected, once a pass has found a pose; training and first passes have none.
+    pub prior: Option<PositionPrior>,
 }
 
 /// The layout of a branch.
@@ -119,6 +122,7 @@ impl SemConfig {
 impl SrrfConfig {
     /// The layout of `clouds`, sources and then targets.
     pub fn layout(&self, clouds: &HostClouds, phase: f32) -> SrrfLayout {
-        SrrfLayout { sem: self.sem.layout(clouds), dense: self.dense.layout(clouds, phase), phase }
+        let (sem, dense) = (self.sem.layout(clouds), self.dense.layout(clouds, phase));
+        SrrfLayout { sem, dense, phase, prior: None }
     }
 }

@@ -24,6 +24,7 @@ mod matching;
 mod memory;
 mod norm;
 mod pfi;
+mod prior;
 mod procrustes;
 mod register;
 mod sem;
@@ -47,6 +48,7 @@ pub use matching::{MatchingConfig, Scaled, SoftMatches, SoftMatching, sinkhorn, 
 pub use memory::keep_freed_memory;
 pub use norm::GroupNorm;
 pub use pfi::{Pfi, PfiConfig};
+pub use prior::PositionPrior;
 pub use procrustes::{nearest_rotation, procrustes, transform, weighted_procrustes};
 pub use register::{SrrfRegister, subsample};
 pub use sem::{LevelConfig, Sem, SemConfig, Skeleton, nearest_distance};

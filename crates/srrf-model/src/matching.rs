@@ -91,22 +91,30 @@ impl SoftMatching {
     /// # Shapes
     /// - `source_features`: `[batch, n, width]`, `target_features`: `[batch, m, width]`,
     ///   `target_points`: `[batch, m, 3]`
+    /// - `log_prior`: `[batch, n, m]`, what is known of the matches beforehand, up to a constant
     pub fn forward(
         &self,
         source_features: Tensor<3>,
         target_features: Tensor<3>,
         target_points: Tensor<3>,
+        log_prior: Option<Tensor<3>>,
     ) -> SoftMatches {
         let scores = self.scores(source_features, target_features);
-        let found = self.soft(scores, target_points.clone());
-        if !self.best {
-            return found;
-        }
-        SoftMatches { points: most_probable(&found.probabilities, target_points), ..found }
+        let scores = match log_prior {
+            Some(log_prior) => scores + log_prior,
+            None => scores,
+        };
+        let (probabilities, matched) = self.probabilities(scores);
+        let points = match self.best {
+            true => most_probable(&probabilities, target_points),
+            false => probabilities.clone().matmul(target_points),
+        };
+        SoftMatches { points, probabilities, matched }
     }
 
-    fn soft(&self, scores: Tensor<3>, target_points: Tensor<3>) -> SoftMatches {
-        let Some(slack) = &self.slack else { return soft_matches(scores, target_points) };
+    /// `m(x_i, Y)` and, with slack, the probability to have a match.
+    fn probabilities(&self, scores: Tensor<3>) -> (Tensor<3>, Option<Tensor<3>>) {
+        let Some(slack) = &self.slack else { return (softmax(scores, 2), None) };
         // Target points first, so that source points come last: each sums to 1 with its slack.
         let transposed = (scores - slack.val().unsqueeze::<3>()).transpose();
         let Scaled { kernel, rows: columns, .. } = sinkhorn(transposed, self.sinkhorn);
@@ -114,11 +122,7 @@ impl SoftMatching {
         let total = mass.clone().sum_dim(2);
         let probabilities = mass / (total.clone() + 1e-12);
         let matched = total.clone() / (total + 1.0); // 1 - u
-        SoftMatches {
-            points: probabilities.clone().matmul(target_points),
-            probabilities,
-            matched: Some(matched),
-        }
+        (probabilities, Some(matched))
     }
 
     /// `[batch, n, m]`.

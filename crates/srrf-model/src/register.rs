@@ -11,6 +11,7 @@ use crate::branch::BranchOutput;
 use crate::geometry::even_subsample;
 use crate::inference::InferenceConfig;
 use crate::integration::IntegrationConfig;
+use crate::prior::PositionPrior;
 use crate::sem;
 use crate::srrf::Srrf;
 use crate::weights::LoadedModel;
@@ -25,6 +26,8 @@ pub struct SrrfRegister {
     /// The same network, as the last pass uses it.
     last: Srrf,
     integration: IntegrationConfig,
+    /// Standard deviation of the prior on where matches lie, in the passes after the first one.
+    prior: Option<f64>,
     device: Device,
     /// Largest number of points that the network sees of a cloud; larger clouds are subsampled
     /// evenly. It was trained with 1,024.
@@ -36,14 +39,14 @@ pub struct SrrfRegister {
 impl SrrfRegister {
     /// The network of a weights file; `device` must be the one it was loaded on.
     pub fn new(loaded: LoadedModel, device: Device) -> Self {
-        let InferenceConfig { passes, last_tokens, last_matches } = loaded.config.inference;
+        let InferenceConfig { passes, last_tokens, last_matches, prior } = loaded.config.inference;
         let (model, integration) = (loaded.model.valid(), loaded.config.integration);
         let mut last = model.clone();
         last.dense = last.dense.with_matches(last_matches);
         if let Some(tokens) = last_tokens {
             last.dense = last.dense.with_tokens(tokens);
         }
-        Self { model, last, integration, device, max_points: 1024, passes }
+        Self { model, last, integration, prior, device, max_points: 1024, passes }
     }
 
     /// A network for a quick look: one pass, with at most `tokens` tokens in the dense branch.
@@ -55,10 +58,18 @@ impl SrrfRegister {
         Self::new(loaded, device)
     }
 
-    /// One pass over pairs that all have `points` points a cloud.
-    fn pass(&self, model: &Srrf, pairs: &[(&PointCloud, &PointCloud)]) -> Vec<Option<Registration>> {
+    /// One pass over pairs that all have `points` points a cloud; `placed` says whether a pass before it placed the
+    /// sources.
+    fn pass(
+        &self,
+        model: &Srrf,
+        pairs: &[(&PointCloud, &PointCloud)],
+        placed: bool,
+    ) -> Vec<Option<Registration>> {
         let Some(batch) = PairBatch::new(pairs, &self.device) else { return vec![None; pairs.len()] };
-        let output = model.forward(&self.integration, batch.source.clone(), batch.target.clone(), PHASE);
+        let prior = self.prior.filter(|_| placed).map(|prior| PositionPrior::new(prior, &batch.frames));
+        let (source, target) = (batch.source.clone(), batch.target.clone());
+        let output = model.forward_near(&self.integration, source, target, PHASE, prior);
         let fused = batch.poses(&output.fused.rotation, &output.fused.translation);
         let dense = batch.poses(&output.dense.rotation, &output.dense.translation);
         let skeleton = batch.poses(&output.skeleton.rotation, &output.skeleton.translation);
@@ -117,7 +128,7 @@ impl SrrfRegister {
             let model = if pass == passes { &self.last } else { &self.model };
             let start = found.as_ref().map_or_else(Rigid::identity, |r| r.target_from_source);
             let moved = source.transformed(&start);
-            let answer = self.pass(model, &[(&moved, &target)]).pop().flatten();
+            let answer = self.pass(model, &[(&moved, &target)], found.is_some()).pop().flatten();
             let answer = answer.ok_or_else(|| {
                 RegisterError::NoPose(
                     "the network's output is not finite; are the coordinates extreme?".into(),

@@ -70,6 +70,9 @@ impl SrrfConfig {
         if self.inference.passes == 0 {
             return wrong("inference.passes".into(), "must be 1 or more");
         }
+        if self.inference.prior.is_some_and(|deviation| !(deviation.is_finite() && deviation > 0.0)) {
+            return wrong("inference.prior".into(), "must be a number above 0; leave it out for no prior");
+        }
         Ok(())
     }
 }

@@ -10,6 +10,7 @@ use crate::geometry::HostClouds;
 use crate::inference::InferenceConfig;
 use crate::integration::{Fusion, IntegrationConfig};
 use crate::layout::SrrfLayout;
+use crate::prior::PositionPrior;
 use crate::sem::{Sem, SemConfig, Skeleton};
 use crate::timing::timed;
 
@@ -80,9 +81,24 @@ impl Srrf {
         target: Tensor<3>,
         phase: f32,
     ) -> SrrfOutput {
+        self.forward_near(integration, source, target, phase, None)
+    }
+
+    /// As [`Srrf::forward`], with a prior on where matches lie: the passes after the first one.
+    ///
+    /// # Shapes
+    /// - `source`, `target`: `[batch, points, 3]`
+    pub fn forward_near(
+        &self,
+        integration: &IntegrationConfig,
+        source: Tensor<3>,
+        target: Tensor<3>,
+        phase: f32,
+        prior: Option<PositionPrior>,
+    ) -> SrrfOutput {
         let layout = stage("layout", || {
             let both = HostClouds::read(&Tensor::cat(vec![source.clone(), target.clone()], 0));
-            SrrfLayout { sem: self.sem.layout(&both), dense: self.dense.layout(&both, phase), phase }
+            SrrfLayout { sem: self.sem.layout(&both), dense: self.dense.layout(&both, phase), phase, prior }
         });
         let (skeletons, skeleton, dense) = self.branches(source.clone(), target.clone(), &layout);
         // (4) Integration: {R, t} = lambda {R_c, t_c} + (1 - lambda) {R_s, t_s}.
@@ -111,8 +127,9 @@ impl Srrf {
         let on_skeletons =
             stage("skeleton layout", || self.skeleton.layout(&HostClouds::read(&stopped), layout.phase));
         // (2, 3) Features, interaction, matching and SVD: {R_s, t_s} and {R_c, t_c}.
-        let skeleton = stage("skeleton branch", || self.skeleton.forward_with(stopped, &on_skeletons));
-        let dense = stage("dense branch", || self.dense.forward_with(clouds, &layout.dense));
+        let prior = layout.prior.as_ref();
+        let skeleton = stage("skeleton branch", || self.skeleton.forward_with(stopped, &on_skeletons, prior));
+        let dense = stage("dense branch", || self.dense.forward_with(clouds, &layout.dense, prior));
         (skeletons.halves(), skeleton, dense)
     }
 }

@@ -5,7 +5,8 @@ mod common;
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{DType, Device, Tensor};
 use common::{Numbers, difference, tensor, tensor64, values};
-use srrf_model::{Matches, MatchingConfig, SoftMatching, init, sinkhorn};
+use srrf_cloud::PointCloud;
+use srrf_model::{Matches, MatchingConfig, PairFrame, PositionPrior, SoftMatching, init, sinkhorn};
 
 const CLOUDS: usize = 3;
 const SOURCES: usize = 5;
@@ -66,7 +67,7 @@ fn normalised_scores_do_not_know_how_long_features_are() {
         };
         let config = MatchingConfig { normalise: true, ..MatchingConfig::default() };
         let y = tensor(&targets(), [CLOUDS, TARGETS, 3], &Device::flex());
-        let found = matching(&config).forward(scaled(1, SOURCES), scaled(2, TARGETS), y);
+        let found = matching(&config).forward(scaled(1, SOURCES), scaled(2, TARGETS), y, None);
         assert!(found.matched.is_none());
         values(&found.points)
     };
@@ -85,6 +86,7 @@ fn slack_takes_what_has_no_match() {
         tensor(&x, [CLOUDS, n, WIDTH], &Device::flex()),
         tensor(&y, [CLOUDS, m, WIDTH], &Device::flex()),
         tensor(&targets(), [CLOUDS, m, 3], &Device::flex()),
+        None,
     );
     let matched = found.matched.as_ref().map(values).unwrap_or_default();
     for of_cloud in matched.chunks_exact(n) {
@@ -109,7 +111,7 @@ fn gradients_are_those_of_finite_differences() {
         let config = BOTH.init(&device).map(&mut Double);
         let y = tensor64(&y, [CLOUDS, TARGETS, WIDTH], &device);
         let points = tensor64(&targets(), [CLOUDS, TARGETS, 3], &device);
-        let found = config.forward(x, y, points);
+        let found = config.forward(x, y, points, None);
         let both = Tensor::cat(found.matched.into_iter().chain([found.points]).collect(), 2);
         (both * tensor64(&weights, [CLOUDS, SOURCES, 4], &device)).sum()
     };
@@ -137,6 +139,7 @@ fn the_best_match_is_the_target_point_with_the_greatest_probability() {
                 tensor(&features(1, SOURCES), [CLOUDS, SOURCES, WIDTH], &device),
                 tensor(&features(2, TARGETS), [CLOUDS, TARGETS, WIDTH], &device),
                 tensor(&targets(), [CLOUDS, TARGETS, 3], &device),
+                None,
             )
         };
         let (mean, best) = (run(Matches::Mean), run(Matches::Best));
@@ -152,4 +155,65 @@ fn the_best_match_is_the_target_point_with_the_greatest_probability() {
         }
         assert!(difference(&points, &values(&mean.points)) > 0.01);
     }
+}
+
+#[test]
+fn a_prior_weighs_the_probabilities() {
+    let device = Device::flex();
+    let log_prior: Vec<f64> = Numbers(6).many(CLOUDS * SOURCES * TARGETS);
+    let run = |log_prior| {
+        SoftMatching::new(&device).forward(
+            tensor(&features(1, SOURCES), [CLOUDS, SOURCES, WIDTH], &device),
+            tensor(&features(2, TARGETS), [CLOUDS, TARGETS, WIDTH], &device),
+            tensor(&targets(), [CLOUDS, TARGETS, 3], &device),
+            log_prior,
+        )
+    };
+    let without = values(&run(None).probabilities);
+    let with = values(&run(Some(tensor(&log_prior, [CLOUDS, SOURCES, TARGETS], &device))).probabilities);
+    let rows = without.chunks_exact(TARGETS).zip(log_prior.chunks_exact(TARGETS));
+    let wanted: Vec<f64> = rows
+        .flat_map(|(row, prior)| {
+            let weighed: Vec<f64> = row.iter().zip(prior).map(|(p, prior)| p * prior.exp()).collect();
+            let sum: f64 = weighed.iter().sum();
+            weighed.into_iter().map(move |p| p / sum)
+        })
+        .collect();
+    assert!(difference(&with, &wanted) < 1e-6 && difference(&with, &without) > 0.01);
+}
+
+#[test]
+fn the_position_prior_is_about_placed_points_not_centred_ones() {
+    // Two pairs, far from the origin; the target of each lacks a part of the source, so their means differ.
+    let (size, deviation) = (2.5, 0.2);
+    let far = |seed: u64, n: usize| -> Vec<[f64; 3]> {
+        let numbers = Numbers(seed).many(n * 3);
+        numbers.chunks_exact(3).map(|p| [0, 1, 2].map(|c| size * p[c] + 1e3)).collect()
+    };
+    let sources = [far(7, SOURCES), far(8, SOURCES)];
+    let targets = sources.clone().map(|cloud| cloud[1..].to_vec());
+    let pairs: Vec<(PointCloud, PointCloud)> = sources
+        .iter()
+        .zip(&targets)
+        .map(|(x, y)| (PointCloud::new(x.clone()).unwrap(), PointCloud::new(y.clone()).unwrap()))
+        .collect();
+    let frames: Vec<PairFrame> = pairs.iter().map(|(x, y)| PairFrame::new(x, y)).collect();
+    let network = |clouds: &[Vec<[f64; 3]>; 2], to: fn(&PairFrame, &[f64; 3]) -> [f64; 3]| -> Tensor<3> {
+        let points = clouds.iter().zip(&frames).flat_map(|(c, frame)| c.iter().map(move |p| to(frame, p)));
+        let points: Vec<f64> = points.flatten().collect();
+        tensor64(&points, [2, points.len() / 6, 3], &Device::flex())
+    };
+    let (x, y) = (network(&sources, PairFrame::source), network(&targets, PairFrame::target));
+    let found = values(&PositionPrior::new(deviation, &frames).log_density(x, y));
+    let mut wanted = Vec::new();
+    for ((x, y), frame) in sources.iter().zip(&targets).zip(&frames) {
+        let unit = frame.undo_length(1.0);
+        for a in x {
+            for b in y {
+                let square: f64 = (0..3).map(|c| ((a[c] - b[c]) / unit).powi(2)).sum();
+                wanted.push(-square / (2.0 * deviation * deviation));
+            }
+        }
+    }
+    assert!(difference(&found, &wanted) < 1e-6 * wanted.iter().fold(0.0, |most: f64, v| most.max(v.abs())));
 }

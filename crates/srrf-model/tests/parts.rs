@@ -224,7 +224,8 @@ fn matches_are_expectations_over_the_target() {
     let (n, m, width) = (13, 17, 9);
     let matching = SoftMatching::new(&Device::flex());
     let y = clouds(25, CLOUDS, m);
-    let found = matching.forward(features(26, CLOUDS, n, width), features(27, CLOUDS, m, width), y.clone());
+    let found =
+        matching.forward(features(26, CLOUDS, n, width), features(27, CLOUDS, m, width), y.clone(), None);
     assert_eq!(found.points.dims(), [CLOUDS, n, 3]);
     assert_eq!(found.probabilities.dims(), [CLOUDS, n, m]);
     let probabilities = values(&found.probabilities);
@@ -235,13 +236,14 @@ fn matches_are_expectations_over_the_target() {
 
     // Features that are all alike match everything with everything: the mean of the target.
     let ones = Tensor::ones([CLOUDS, n, width], &Device::flex());
-    let even = matching.forward(ones.clone(), Tensor::ones([CLOUDS, m, width], &Device::flex()), y.clone());
+    let even =
+        matching.forward(ones.clone(), Tensor::ones([CLOUDS, m, width], &Device::flex()), y.clone(), None);
     assert!(apart(&even.points, &y.clone().mean_dim(1).expand([CLOUDS, n, 3])) < 1e-6);
 
     // Features that single a target point out match it.
     let one_hot = Tensor::<2>::eye(m, &Device::flex()).unsqueeze::<3>().repeat_dim(0, CLOUDS) * 30.0;
     let order = Numbers(28).permutation(m);
-    let exact = matching.forward(reordered(&one_hot, &order), one_hot, y.clone());
+    let exact = matching.forward(reordered(&one_hot, &order), one_hot, y.clone(), None);
     assert!(apart(&exact.points, &reordered(&y, &order)) < 1e-5);
 }
 

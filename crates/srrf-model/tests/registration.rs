@@ -285,7 +285,7 @@ fn more_points_than_the_network_takes_are_subsampled_and_passes_are_chained() {
 #[test]
 fn the_header_says_how_the_network_is_used() {
     let (source, target) = (cloud(25, 61), cloud(26, 61));
-    let last = InferenceConfig { passes: 3, last_tokens: Some(0), last_matches: Matches::Best };
+    let last = InferenceConfig { passes: 3, last_tokens: Some(0), last_matches: Matches::Best, prior: None };
     let answer = network_with(last.clone()).register(&source, &target).unwrap();
     assert_eq!((answer.iterations, answer.matches.len()), (3, 61), "all points are tokens");
     // Every match is a target point.
@@ -303,4 +303,30 @@ fn the_header_says_how_the_network_is_used() {
     first.passes = 1;
     let soft = first.register(&source, &target).unwrap();
     assert!(soft.matches.len() < 61 && !soft.matches.iter().all(matched));
+}
+
+#[test]
+fn a_narrow_prior_matches_each_point_with_the_nearest_one() {
+    let (source, target) = (cloud(25, 61), cloud(26, 61));
+    let prior = |passes| InferenceConfig {
+        passes,
+        last_tokens: Some(0),
+        last_matches: Matches::Best,
+        prior: Some(1e-3),
+    };
+    // The first pass knows of no pose, and takes no notice.
+    let without = InferenceConfig { prior: None, ..prior(1) };
+    let first = network_with(without).register(&source, &target).unwrap().target_from_source;
+    assert_eq!(network_with(prior(1)).register(&source, &target).unwrap().target_from_source, first);
+
+    let soft = network_with(InferenceConfig { passes: 1, ..InferenceConfig::default() });
+    let placed = soft.register(&source, &target).unwrap().target_from_source;
+    let answer = network_with(prior(2)).register(&source, &target).unwrap();
+    assert_eq!(answer.matches.len(), 61);
+    for m in &answer.matches {
+        let at = placed.apply(&m.source);
+        let off = |p: &[f64; 3]| (0..3).map(|c| (p[c] - at[c]).powi(2)).sum::<f64>().sqrt();
+        let nearest = target.points().iter().map(off).fold(f64::MAX, f64::min);
+        assert!(off(&m.target) < nearest + 1e-3, "{} {nearest}", off(&m.target));
+    }
 }

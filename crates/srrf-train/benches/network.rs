@@ -157,7 +157,8 @@ mod network {
         let features = config.sfe.init(&b.device).forward(tokens.clone(), clouds).chunk(2, 0);
         let points = tokens.chunk(2, 0)[1].clone();
         let matching = SoftMatching::new(&b.device);
-        bencher.bench_local(|| matching.forward(features[0].clone(), features[1].clone(), points.clone()));
+        bencher
+            .bench_local(|| matching.forward(features[0].clone(), features[1].clone(), points.clone(), None));
     }
 
     #[divan::bench(args = BRANCHES)]

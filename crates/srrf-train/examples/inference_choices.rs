@@ -2,13 +2,18 @@
 //! tokens, inlier test. The test split plays no part. The tables of docs/experiments.md come from
 //!
 //! ```sh
-//! cargo run -p srrf-train --example inference_choices -- configs/modelnet-small.toml WEIGHTS DATA [SEVERITIES]
+//! cargo run -p srrf-train --example inference_choices -- configs/modelnet-small.toml WEIGHTS DATA [SEVERITIES [KEEP]]
 //! ```
+//!
+//! `KEEP`, such as 0.8, is the share of each cloud that is kept: the farthest points along a direction of its own.
 
 use std::path::Path;
 
+use rand::SeedableRng;
+use rand::rngs::ChaCha8Rng;
 use srrf_cloud::source::{Split, open};
 use srrf_cloud::{PointCloud, Register};
+use srrf_corrupt::crop::{crop, random_direction};
 use srrf_corrupt::{Pair, Severity};
 use srrf_eval::{PairError, Scores};
 use srrf_model::{InferenceConfig, InlierTest, Matches, SrrfRegister, device, keep_freed_memory, weights};
@@ -20,20 +25,23 @@ use srrf_train::step::Workers;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     keep_freed_memory();
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let (config, weights_path, data, severities) = match arguments.as_slice() {
-        [config, weights, data] => (config, weights, data, "3"),
-        [config, weights, data, severities] => (config, weights, data, severities.as_str()),
-        _ => return Err("usage: inference_choices CONFIG WEIGHTS DATA [SEVERITIES]".into()),
+    let [config, weights_path, data, rest @ ..] = arguments.as_slice() else {
+        return Err("usage: inference_choices CONFIG WEIGHTS DATA [SEVERITIES [KEEP]]".into());
     };
+    let severities = rest.first().map_or("3", String::as_str);
+    let keep: f64 = rest.get(1).map_or(Ok(1.0), |keep| keep.parse())?;
     let config = <TrainConfig>::read(Path::new(config))?;
     let pairs = TrainingPairs::new(&config, open(Path::new(data), Split::Train)?)?;
     let mut held_out: Vec<Pair> = Vec::new();
     for severity in severities.split(',') {
         held_out.extend(pairs.validation(Severity::try_from(severity.parse::<u8>()?)?)?);
     }
+    if keep < 1.0 {
+        held_out.iter_mut().enumerate().try_for_each(|(i, pair)| cut(pair, keep, i as u64))?;
+    }
     let workers = Workers::new(std::thread::available_parallelism().map_or(1, usize::from))?;
     println!(
-        "{}; {} pairs at severity {severities}; RMSE / MAE / median of R in degrees",
+        "{}; {} pairs at severity {severities}, {keep} of each cloud kept; RMSE / MAE / median of R in degrees",
         pairs.description(),
         held_out.len()
     );
@@ -42,57 +50,67 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
          |---|---|---|---|---|---|---|---|---|"
     );
     let (nearest, both, soft) = (InlierTest::Nearest, InlierTest::BothWays, InlierTest::SoftMatch);
-    // Number of passes, tokens in them, tokens and matches in the last one, inlier test.
-    let (mean, best) = (Matches::Mean, Matches::Best);
-    for (passes, tokens, (last_tokens, matches), test, threshold, skeleton_threshold, sharpness) in [
-        (1, 256, (256, mean), nearest, 0.05, 0.05, 1.0),
-        (1, 256, (256, mean), nearest, 0.05, 0.05, 16.0),
-        (1, 256, (256, mean), both, 0.05, 0.04, 16.0),
-        (2, 256, (256, mean), nearest, 0.05, 0.05, 1.0),
-        (2, 256, (256, mean), nearest, 0.05, 0.05, 16.0),
-        (2, 256, (256, mean), nearest, 0.05, 0.05, 64.0),
-        (2, 256, (256, mean), nearest, 0.03, 0.03, 16.0),
-        (2, 256, (256, mean), nearest, 0.02, 0.02, 16.0),
-        (2, 256, (256, mean), nearest, 0.08, 0.08, 16.0),
-        (2, 256, (256, mean), soft, 0.05, 0.1, 1.0),
-        (3, 256, (256, mean), nearest, 0.05, 0.05, 16.0),
-        (2, 256, (256, mean), both, 0.05, 0.05, 4.0),
-        (2, 256, (256, mean), both, 0.05, 0.05, 16.0),
-        (2, 256, (256, mean), both, 0.05, 0.05, 64.0),
-        (2, 256, (256, mean), both, 0.05, 0.04, 16.0),
-        (2, 512, (512, mean), nearest, 0.05, 0.05, 16.0),
-        (2, 512, (512, mean), nearest, 0.05, 0.04, 16.0),
-        (2, 512, (512, mean), soft, 0.05, 0.05, 4.0),
-        (2, 512, (512, mean), both, 0.05, 0.05, 4.0),
-        (2, 512, (512, mean), both, 0.05, 0.05, 16.0),
-        (2, 512, (512, mean), both, 0.05, 0.047, 16.0),
-        (2, 512, (512, mean), both, 0.05, 0.045, 16.0),
-        (2, 512, (512, mean), both, 0.05, 0.04, 16.0),
-        (2, 512, (512, mean), both, 0.05, 0.03, 16.0),
-        (2, 512, (512, mean), both, 0.05, 0.04, 64.0),
-        (2, 512, (512, mean), both, 0.05, 0.03, 64.0),
-        (3, 512, (512, mean), both, 0.05, 0.04, 16.0),
-        (2, 768, (768, mean), both, 0.05, 0.04, 16.0),
-        (1, 256, (256, best), both, 0.05, 0.03, 64.0),
-        (1, 512, (512, best), both, 0.05, 0.03, 64.0),
-        (2, 256, (512, best), both, 0.05, 0.03, 64.0),
-        (2, 256, (1024, best), both, 0.05, 0.03, 64.0),
-        (2, 512, (512, best), both, 0.05, 0.03, 64.0),
-        (2, 512, (1024, mean), both, 0.05, 0.03, 64.0),
-        (2, 512, (1024, best), both, 0.05, 0.03, 64.0),
-        (2, 512, (1024, best), both, 0.05, 0.05, 16.0),
-        (2, 512, (1024, best), both, 0.03, 0.03, 16.0),
-        (2, 512, (1024, best), both, 0.03, 0.03, 64.0),
-        (2, 512, (1024, best), both, 0.03, 0.02, 64.0),
-        (2, 512, (1024, best), both, 0.03, 0.01, 256.0),
-        (2, 512, (768, best), both, 0.05, 0.03, 64.0),
-        (3, 256, (512, best), both, 0.05, 0.03, 64.0),
-        (3, 256, (1024, best), both, 0.05, 0.03, 64.0),
-        (3, 256, (1024, best), both, 0.03, 0.03, 16.0),
-        (3, 256, (1024, best), both, 0.02, 0.015, 256.0),
-        (3, 128, (1024, best), both, 0.05, 0.03, 64.0),
-        (4, 256, (1024, best), both, 0.05, 0.03, 64.0),
-        (5, 256, (1024, best), both, 0.05, 0.03, 64.0),
+    // Number of passes, tokens in them; tokens and matches in the last one, and the prior of all but the first; inlier
+    // test.
+    let mean = |tokens| (tokens, Matches::Mean, None);
+    let best = |tokens| (tokens, Matches::Best, None);
+    let near = |tokens, deviation| (tokens, Matches::Best, Some(deviation));
+    for (passes, tokens, (last_tokens, matches, prior), test, threshold, skeleton_threshold, sharpness) in [
+        (1, 256, mean(256), nearest, 0.05, 0.05, 1.0),
+        (1, 256, mean(256), nearest, 0.05, 0.05, 16.0),
+        (1, 256, mean(256), both, 0.05, 0.04, 16.0),
+        (2, 256, mean(256), nearest, 0.05, 0.05, 1.0),
+        (2, 256, mean(256), nearest, 0.05, 0.05, 16.0),
+        (2, 256, mean(256), nearest, 0.05, 0.05, 64.0),
+        (2, 256, mean(256), nearest, 0.03, 0.03, 16.0),
+        (2, 256, mean(256), nearest, 0.02, 0.02, 16.0),
+        (2, 256, mean(256), nearest, 0.08, 0.08, 16.0),
+        (2, 256, mean(256), soft, 0.05, 0.1, 1.0),
+        (3, 256, mean(256), nearest, 0.05, 0.05, 16.0),
+        (2, 256, mean(256), both, 0.05, 0.05, 4.0),
+        (2, 256, mean(256), both, 0.05, 0.05, 16.0),
+        (2, 256, mean(256), both, 0.05, 0.05, 64.0),
+        (2, 256, mean(256), both, 0.05, 0.04, 16.0),
+        (2, 512, mean(512), nearest, 0.05, 0.05, 16.0),
+        (2, 512, mean(512), nearest, 0.05, 0.04, 16.0),
+        (2, 512, mean(512), soft, 0.05, 0.05, 4.0),
+        (2, 512, mean(512), both, 0.05, 0.05, 4.0),
+        (2, 512, mean(512), both, 0.05, 0.05, 16.0),
+        (2, 512, mean(512), both, 0.05, 0.047, 16.0),
+        (2, 512, mean(512), both, 0.05, 0.045, 16.0),
+        (2, 512, mean(512), both, 0.05, 0.04, 16.0),
+        (2, 512, mean(512), both, 0.05, 0.03, 16.0),
+        (2, 512, mean(512), both, 0.05, 0.04, 64.0),
+        (2, 512, mean(512), both, 0.05, 0.03, 64.0),
+        (3, 512, mean(512), both, 0.05, 0.04, 16.0),
+        (2, 768, mean(768), both, 0.05, 0.04, 16.0),
+        (1, 256, best(256), both, 0.05, 0.03, 64.0),
+        (1, 512, best(512), both, 0.05, 0.03, 64.0),
+        (2, 256, best(512), both, 0.05, 0.03, 64.0),
+        (2, 256, best(1024), both, 0.05, 0.03, 64.0),
+        (2, 512, best(512), both, 0.05, 0.03, 64.0),
+        (2, 512, mean(1024), both, 0.05, 0.03, 64.0),
+        (2, 512, best(1024), both, 0.05, 0.03, 64.0),
+        (2, 512, best(1024), both, 0.05, 0.05, 16.0),
+        (2, 512, best(1024), both, 0.03, 0.03, 16.0),
+        (2, 512, best(1024), both, 0.03, 0.03, 64.0),
+        (2, 512, best(1024), both, 0.03, 0.02, 64.0),
+        (2, 512, best(1024), both, 0.03, 0.01, 256.0),
+        (2, 512, best(768), both, 0.05, 0.03, 64.0),
+        (3, 256, best(512), both, 0.05, 0.03, 64.0),
+        (3, 256, best(1024), both, 0.05, 0.03, 64.0),
+        (3, 256, best(1024), both, 0.03, 0.03, 16.0),
+        (3, 256, best(1024), both, 0.02, 0.015, 256.0),
+        (3, 128, best(1024), both, 0.05, 0.03, 64.0),
+        (4, 256, best(1024), both, 0.05, 0.03, 64.0),
+        (5, 256, best(1024), both, 0.05, 0.03, 64.0),
+        (3, 256, best(1024), both, 0.03, 0.01, 256.0),
+        (2, 512, near(1024, 0.1), both, 0.03, 0.01, 256.0),
+        (2, 512, near(1024, 0.15), both, 0.03, 0.01, 256.0),
+        (3, 512, near(1024, 0.15), both, 0.03, 0.01, 256.0),
+        (3, 256, near(1024, 0.1), both, 0.03, 0.01, 256.0),
+        (4, 256, near(1024, 0.1), both, 0.03, 0.01, 256.0),
+        (4, 256, near(1024, 0.15), both, 0.03, 0.01, 256.0),
     ] {
         let device = device("flex")?;
         let mut loaded = weights::load(Path::new(weights_path), &device)?;
@@ -102,13 +120,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         loaded.config.integration.dense_threshold = threshold;
         loaded.config.integration.skeleton_threshold = skeleton_threshold;
         loaded.config.inference =
-            InferenceConfig { passes, last_tokens: Some(last_tokens), last_matches: matches };
+            InferenceConfig { passes, last_tokens: Some(last_tokens), last_matches: matches, prior };
         let method = SrrfRegister::new(loaded, device);
+        let near = prior.map(|deviation| format!(", prior {deviation}")).unwrap_or_default();
         let rows = score(&method, &held_out, &workers)?;
         println!(
-            "| {passes} | {tokens} | {last_tokens} {matches:?} | {test:?} {threshold} {skeleton_threshold} | {sharpness} | {} |",
+            "| {passes} | {tokens} | {last_tokens} {matches:?}{near} | {test:?} {threshold} {skeleton_threshold} | {sharpness} | {} |",
             rows.join(" | ")
         );
+    }
+    Ok(())
+}
+
+/// Keeps a share of both clouds, each on one side of a plane of its own.
+fn cut(pair: &mut Pair, keep: f64, seed: u64) -> Result<(), srrf_cloud::CloudError> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    for cloud in [&mut pair.source, &mut pair.target] {
+        let kept = crop(cloud.points(), &random_direction(&mut rng), keep);
+        *cloud = PointCloud::new(kept.into_iter().map(|i| cloud.points()[i]).collect())?;
     }
     Ok(())
 }

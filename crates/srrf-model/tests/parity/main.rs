@@ -134,7 +134,7 @@ fn matching_and_svd() {
         let names = ["source_features", "target_features", "source_points", "target_points"];
         let inputs = names.map(|name| reference.tensor::<3>(&format!("head.{name}")));
         let [source_features, target_features, source, target] = inputs.clone();
-        let found = matching.forward(source_features, target_features, target);
+        let found = matching.forward(source_features, target_features, target, None);
         let (rotation, translation) = procrustes(source, found.points.clone());
         reference.compare("head.matches", &found.points);
         reference.compare("head.probabilities", &found.probabilities);

@@ -1,0 +1,41 @@
+//! Where matches are to be expected: near where the pass before left the points.
+
+use burn::tensor::{Tensor, TensorData};
+
+use crate::batch::PairFrame;
+
+/// A Gaussian about each source point, as the pose of the pass before placed it, for where its match lies. Not in the
+/// paper, whose network is applied once and knows nothing of the pose; RPMNet matches by distances, too, in all its passes.
+///
+/// Clouds come to the network centred on their own means, which takes the translation away. Where they overlap in part,
+/// their means are not the same place; the prior is about the placed points, not about the centred ones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PositionPrior {
+    /// Standard deviation along each axis, network units.
+    deviation: f64,
+    /// What brings a centred source point of each pair to where it was placed among the centred target points.
+    shifts: Vec<[f64; 3]>,
+}
+
+impl PositionPrior {
+    /// The prior of pairs whose sources are placed by the pass before. `deviation` is the standard deviation along
+    /// each axis, in network units (clouds of a root mean square radius of 0.6).
+    pub fn new(deviation: f64, frames: &[PairFrame]) -> Self {
+        let shift = |frame: &PairFrame| frame.target(&frame.undo_source(&[0.0; 3]));
+        Self { deviation, shifts: frames.iter().map(shift).collect() }
+    }
+
+    /// Its logarithm without the constant, `-|x_i + shift - y_j|^2 / (2 deviation^2)`, which scores of matches take in.
+    ///
+    /// # Shapes
+    /// - `source`: `[batch, n, 3]`, `target`: `[batch, m, 3]`; output: `[batch, n, m]`
+    pub fn log_density(&self, source: Tensor<3>, target: Tensor<3>) -> Tensor<3> {
+        let shifts = TensorData::new(self.shifts.concat(), [self.shifts.len(), 1, 3]);
+        let device = source.device().without_autodiff();
+        let placed = source.clone() + Tensor::<3>::from_data(shifts, (&device, source.dtype()));
+        let square = |points: &Tensor<3>| points.clone().square().sum_dim(2);
+        let squares = square(&placed) + square(&target).transpose();
+        let squared_distance = squares - placed.matmul(target.transpose()) * 2.0;
+        squared_distance * (-0.5 / self.deviation.powi(2))
+    }
+}
