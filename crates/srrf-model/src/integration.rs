@@ -34,8 +34,20 @@ pub struct IntegrationConfig {
     pub dense_threshold: f64,
     /// Inlier threshold of the skeleton branch, network units; its spacing is 4 times as wide.
     pub skeleton_threshold: f64,
-    /// Lambda is `g_c^p / (g_c^p + g_s^p)` with this `p`; the paper's is 1.
+    /// Lambda is `g_c^p / (g_c^p + (w g_s)^p)` with this `p`; the paper's is 1.
     pub sharpness: f64,
+    /// The `w` above. Below 1 the skeleton branch wins only where its pose has that much more inliers: of two poses that
+    /// fit about as well, the dense branch's is the better one more often. Default and the paper: 1.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub skeleton_weight: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
 }
 
 /// The fused pose and what it was made from.
@@ -49,7 +61,7 @@ pub struct Fusion {
     pub dense_inlier_ratio: Vec<f64>,
     /// `gamma_s` of each pair.
     pub skeleton_inlier_ratio: Vec<f64>,
-    /// `lambda = gamma_c / (gamma_c + gamma_s)` of each pair, 0.5 where both are 0.
+    /// `lambda` of each pair, 0.5 where both ratios are 0.
     pub lambda: Vec<f64>,
 }
 
@@ -83,7 +95,7 @@ impl IntegrationConfig {
         let lambda: Vec<f64> = dense_inlier_ratio
             .iter()
             .zip(&skeleton_inlier_ratio)
-            .map(|(c, s)| (c.powf(self.sharpness), s.powf(self.sharpness)))
+            .map(|(c, s)| (c.powf(self.sharpness), (self.skeleton_weight * s).powf(self.sharpness)))
             .map(|(c, s)| if c + s > 0.0 { c / (c + s) } else { 0.5 })
             .collect();
 

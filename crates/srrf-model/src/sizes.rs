@@ -70,6 +70,10 @@ impl SrrfConfig {
         if self.inference.passes == 0 {
             return wrong("inference.passes".into(), "must be 1 or more");
         }
+        let weight = self.integration.skeleton_weight;
+        if !(weight.is_finite() && weight >= 0.0) {
+            return wrong("integration.skeleton_weight".into(), "must be 0 or more; 1 is the paper");
+        }
         if self.inference.prior.is_some_and(|deviation| !(deviation.is_finite() && deviation > 0.0)) {
             return wrong("inference.prior".into(), "must be a number above 0; leave it out for no prior");
         }

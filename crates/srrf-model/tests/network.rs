@@ -161,6 +161,7 @@ fn lambda_weighs_the_inlier_ratios() {
     let mut numbers = Numbers(8);
     let paper = IntegrationConfig { test: InlierTest::SoftMatch, ..tiny().integration };
     let sharp = IntegrationConfig { sharpness: 2.0, ..paper.clone() };
+    let handicapped = IntegrationConfig { skeleton_weight: 0.5, ..sharp.clone() };
     let cloud = numbers.many(21);
     // Inliers of 5 dense and of 7 skeleton correspondences, and lambda at sharpness 1 and 2.
     for (dense, skeleton, lambda, lambda_sharp) in [
@@ -177,6 +178,10 @@ fn lambda_weighs_the_inlier_ratios() {
         assert_eq!(fusion.skeleton_inlier_ratio, [skeleton as f64 / 7.0]);
         assert!((fusion.lambda[0] - lambda).abs() < 1e-12);
         assert!((fuse(&sharp, &c, &s, &cloud, &cloud).lambda[0] - lambda_sharp).abs() < 1e-12);
+        // Half the skeleton's ratio counts: a quarter, squared. Where neither has inliers, both count alike.
+        let odds = 0.25 * (1.0 - lambda_sharp) / lambda_sharp;
+        let wanted = if dense + skeleton > 0 { 1.0 / (1.0 + odds) } else { 0.5 };
+        assert!((fuse(&handicapped, &c, &s, &cloud, &cloud).lambda[0] - wanted).abs() < 1e-12);
 
         let pose = fused_pose(&fusion);
         let blend = lambda * a.translation + (1.0 - lambda) * b.translation;

@@ -49,6 +49,7 @@ fn config() -> SrrfConfig {
             dense_threshold: 0.05,
             skeleton_threshold: 0.05,
             sharpness: 1.0,
+            skeleton_weight: 1.0,
         },
         inference: InferenceConfig::default(),
     }

@@ -49,13 +49,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "| passes | tokens | last pass | inlier test | sharpness | dense | skeleton | fused | the better branch |\n\
          |---|---|---|---|---|---|---|---|---|"
     );
-    let (nearest, both, soft) = (InlierTest::Nearest, InlierTest::BothWays, InlierTest::SoftMatch);
+    let (nearest, both, soft) =
+        ((InlierTest::Nearest, 1.0), (InlierTest::BothWays, 1.0), (InlierTest::SoftMatch, 1.0));
+    // The same test for both, where the skeleton's ratio counts less.
+    let fair = (InlierTest::BothWays, 0.8);
     // Number of passes, tokens in them; tokens and matches in the last one, and the prior of all but the first; inlier
     // test.
     let mean = |tokens| (tokens, Matches::Mean, None);
     let best = |tokens| (tokens, Matches::Best, None);
     let near = |tokens, deviation| (tokens, Matches::Best, Some(deviation));
-    for (passes, tokens, (last_tokens, matches, prior), test, threshold, skeleton_threshold, sharpness) in [
+    for (
+        passes,
+        tokens,
+        (last_tokens, matches, prior),
+        (test, weight),
+        threshold,
+        skeleton_threshold,
+        sharpness,
+    ) in [
         (1, 256, mean(256), nearest, 0.05, 0.05, 1.0),
         (1, 256, mean(256), nearest, 0.05, 0.05, 16.0),
         (1, 256, mean(256), both, 0.05, 0.04, 16.0),
@@ -107,10 +118,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         (3, 256, best(1024), both, 0.03, 0.01, 256.0),
         (2, 512, near(1024, 0.1), both, 0.03, 0.01, 256.0),
         (2, 512, near(1024, 0.15), both, 0.03, 0.01, 256.0),
-        (3, 512, near(1024, 0.15), both, 0.03, 0.01, 256.0),
+        (2, 512, near(1024, 0.15), fair, 0.03, 0.03, 64.0),
+        (3, 512, near(1024, 0.15), fair, 0.03, 0.03, 64.0),
         (3, 256, near(1024, 0.1), both, 0.03, 0.01, 256.0),
         (4, 256, near(1024, 0.1), both, 0.03, 0.01, 256.0),
-        (4, 256, near(1024, 0.15), both, 0.03, 0.01, 256.0),
+        (4, 256, near(1024, 0.1), fair, 0.03, 0.03, 64.0),
+        (4, 256, near(1024, 0.15), fair, 0.03, 0.03, 64.0),
     ] {
         let device = device("flex")?;
         let mut loaded = weights::load(Path::new(weights_path), &device)?;
@@ -119,13 +132,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         loaded.config.integration.sharpness = sharpness;
         loaded.config.integration.dense_threshold = threshold;
         loaded.config.integration.skeleton_threshold = skeleton_threshold;
+        loaded.config.integration.skeleton_weight = weight;
         loaded.config.inference =
             InferenceConfig { passes, last_tokens: Some(last_tokens), last_matches: matches, prior };
         let method = SrrfRegister::new(loaded, device);
+        let less = if weight < 1.0 { format!(", times {weight}") } else { String::new() };
         let near = prior.map(|deviation| format!(", prior {deviation}")).unwrap_or_default();
         let rows = score(&method, &held_out, &workers)?;
         println!(
-            "| {passes} | {tokens} | {last_tokens} {matches:?}{near} | {test:?} {threshold} {skeleton_threshold} | {sharpness} | {} |",
+            "| {passes} | {tokens} | {last_tokens} {matches:?}{near} | {test:?} {threshold} {skeleton_threshold}{less} | {sharpness} | {} |",
             rows.join(" | ")
         );
     }

@@ -62,6 +62,7 @@ pub(crate) fn methods(context: &MethodContext) -> Result<Vec<(&'static [&'static
         loaded.config.integration.dense_threshold = dense;
         loaded.config.integration.skeleton_threshold = skeleton;
         loaded.config.integration.sharpness = sharpness;
+        loaded.config.integration.skeleton_weight = 1.0;
         let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
         let method = Method {
             weights: Some(weights),

@@ -107,6 +107,7 @@ pub fn tiny() -> SrrfConfig {
             dense_threshold: 0.05,
             skeleton_threshold: 0.1,
             sharpness: 1.0,
+            skeleton_weight: 1.0,
         },
         inference: InferenceConfig::default(),
     }
