@@ -8,9 +8,6 @@ use crate::geometry::rows;
 use crate::procrustes::transform;
 use crate::sem::{Skeleton, distance, nearest_distance, nearest_rows};
 
-/// Spreads that losses are divided by are at least this.
-const LEAST_SPREAD: f64 = 1e-3;
-
 /// Weights of the skeleton losses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -22,10 +19,6 @@ pub struct SkeletonLossConfig {
     /// The weight of the distribution distance loss (mean over points; the paper prints a sum). At
     /// 1 the skeleton collapses to its centroid, at 0.25 it keeps its spread.
     pub distribution: f64,
-    /// Whether the distribution distance is taken over the spread of the target skeleton, so that shrinking does not
-    /// lower it and greater weights do not collapse the skeleton. Default: no, as in the paper.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub distribution_over_spread: bool,
     /// The weight of the distance between skeleton points of the same number in both clouds, over
     /// their spread. Not in the paper; 0 is the paper.
     pub index_match: f64,
@@ -79,10 +72,6 @@ pub fn skeleton_loss(
     // L_ddl between the source skeleton under the true pose and the target skeleton.
     let posed = transform(source_skeleton.points.clone(), rotation, translation);
     let distribution = chamfer(posed.clone(), target_skeleton.points.clone());
-    let distribution = match config.distribution_over_spread {
-        true => distribution / spread(target_skeleton.points.clone()).clamp_min(LEAST_SPREAD),
-        false => distribution,
-    };
     let index_match = index_match(posed, target_skeleton.points.clone());
 
     let total = sampling.clone()
@@ -123,7 +112,7 @@ fn point_to_sphere(clouds: Tensor<3>, points: Tensor<3>, radii: Tensor<2>) -> Te
 /// cheapest way to lower the loss.
 fn index_match(posed: Tensor<3>, target: Tensor<3>) -> Tensor<1> {
     let [batch, m, _] = target.dims();
-    let spread = spread(target.clone()).clamp_min(LEAST_SPREAD);
+    let spread = spread(target.clone()).clamp_min(1e-3);
     distance((posed - target).reshape([batch * m, 3])).mean() / spread
 }
 
