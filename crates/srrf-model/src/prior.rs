@@ -5,7 +5,8 @@ use burn::tensor::{Tensor, TensorData};
 use crate::batch::PairFrame;
 
 /// A Gaussian about each source point, as the pose of the pass before placed it, for where its match lies. Not in the
-/// paper, whose network is applied once and knows nothing of the pose; RPMNet matches by distances, too, in all its passes.
+/// paper, whose network is applied once and knows nothing of the pose. Without it matches are by features alone; the narrower
+/// it is, the more they are ICP's nearest points.
 ///
 /// Clouds come to the network centred on their own means, which takes the translation away. Where they overlap in part,
 /// their means are not the same place; the prior is about the placed points, not about the centred ones.
