@@ -141,8 +141,8 @@ impl Branch {
         let half = |x: &Tensor<3>, which: usize| x.clone().narrow(0, which * batch, batch);
         let (source_points, target_points) = (half(&tokens, 0), half(&tokens, 1));
         let phi = |which: usize| half(&features, which);
-        let log_prior = prior.map(|prior| prior.log_density(source_points.clone(), target_points.clone()));
         let matches = timed("matching", &device, || {
+            let log_prior = prior.map(|p| p.log_density(source_points.clone(), target_points.clone()));
             self.matching.forward(phi(0), phi(1), target_points.clone(), log_prior)
         });
         let (rotation, translation) =

@@ -63,7 +63,7 @@ pub fn matching_loss(
 }
 
 /// `|a_i - b_j|^2`, `[batch, n, m]`.
-fn squared_distances(a: &Tensor<3>, b: &Tensor<3>) -> Tensor<3> {
+pub(crate) fn squared_distances(a: &Tensor<3>, b: &Tensor<3>) -> Tensor<3> {
     let square = |x: &Tensor<3>| x.clone().square().sum_dim(2);
     let product = a.clone().matmul(b.clone().transpose());
     (square(a) + square(b).transpose() - product * 2.0).clamp_min(0.0)

@@ -3,6 +3,7 @@
 use burn::tensor::{Tensor, TensorData};
 
 use crate::batch::PairFrame;
+use crate::loss::squared_distances;
 
 /// A Gaussian about each source point, as the pose of the pass before placed it, for where its match lies. Not in the
 /// paper, whose network is applied once and knows nothing of the pose. Without it matches are by features alone; the narrower
@@ -33,10 +34,7 @@ impl PositionPrior {
     pub fn log_density(&self, source: Tensor<3>, target: Tensor<3>) -> Tensor<3> {
         let shifts = TensorData::new(self.shifts.concat(), [self.shifts.len(), 1, 3]);
         let device = source.device().without_autodiff();
-        let placed = source.clone() + Tensor::<3>::from_data(shifts, (&device, source.dtype()));
-        let square = |points: &Tensor<3>| points.clone().square().sum_dim(2);
-        let squares = square(&placed) + square(&target).transpose();
-        let squared_distance = squares - placed.matmul(target.transpose()) * 2.0;
-        squared_distance * (-0.5 / self.deviation.powi(2))
+        let shifts = Tensor::<3>::from_data(shifts, (&device, source.dtype()));
+        squared_distances(&(source + shifts), &target) * (-0.5 / self.deviation.powi(2))
     }
 }

@@ -16,7 +16,9 @@ use srrf_cloud::{PointCloud, Register};
 use srrf_corrupt::crop::{crop, random_direction};
 use srrf_corrupt::{Pair, Severity};
 use srrf_eval::{PairError, Scores};
-use srrf_model::{InferenceConfig, InlierTest, Matches, SrrfRegister, device, keep_freed_memory, weights};
+use srrf_model::{
+    InferenceConfig, InlierTest, IntegrationConfig, Matches, SrrfRegister, device, keep_freed_memory, weights,
+};
 use srrf_train::config::TrainConfig;
 use srrf_train::data::TrainingPairs;
 use srrf_train::step::Workers;
@@ -62,8 +64,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         passes,
         tokens,
         (last_tokens, matches, prior),
-        (test, weight),
-        threshold,
+        (test, skeleton_weight),
+        dense_threshold,
         skeleton_threshold,
         sharpness,
     ) in [
@@ -128,19 +130,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let device = device("flex")?;
         let mut loaded = weights::load(Path::new(weights_path), &device)?;
         loaded.model.dense = loaded.model.dense.with_tokens(tokens);
-        loaded.config.integration.test = test;
-        loaded.config.integration.sharpness = sharpness;
-        loaded.config.integration.dense_threshold = threshold;
-        loaded.config.integration.skeleton_threshold = skeleton_threshold;
-        loaded.config.integration.skeleton_weight = weight;
+        loaded.config.integration =
+            IntegrationConfig { test, dense_threshold, skeleton_threshold, sharpness, skeleton_weight };
         loaded.config.inference =
             InferenceConfig { passes, last_tokens: Some(last_tokens), last_matches: matches, prior };
         let method = SrrfRegister::new(loaded, device);
-        let less = if weight < 1.0 { format!(", times {weight}") } else { String::new() };
+        let less = if skeleton_weight < 1.0 { format!(", times {skeleton_weight}") } else { String::new() };
         let near = prior.map(|deviation| format!(", prior {deviation}")).unwrap_or_default();
         let rows = score(&method, &held_out, &workers)?;
         println!(
-            "| {passes} | {tokens} | {last_tokens} {matches:?}{near} | {test:?} {threshold} {skeleton_threshold}{less} | {sharpness} | {} |",
+            "| {passes} | {tokens} | {last_tokens} {matches:?}{near} | {test:?} {dense_threshold} {skeleton_threshold}{less} | {sharpness} | {} |",
             rows.join(" | ")
         );
     }

@@ -2,7 +2,7 @@
 
 use srrf_cloud::{PointCloud, Register, RegisterError, Registration};
 use srrf_corrupt::CorruptionKind;
-use srrf_model::{InlierTest, SrrfRegister};
+use srrf_model::{InlierTest, IntegrationConfig, SrrfRegister};
 
 use crate::EvalError;
 use crate::methods::{Method, MethodContext, network, plain};
@@ -58,11 +58,13 @@ impl Register for Named {
 pub(crate) fn methods(context: &MethodContext) -> Result<Vec<(&'static [&'static str], Method)>, EvalError> {
     let set_up = |&(rows, test, [dense, skeleton], sharpness): &Variant| {
         let (mut loaded, weights) = network(context)?;
-        loaded.config.integration.test = test;
-        loaded.config.integration.dense_threshold = dense;
-        loaded.config.integration.skeleton_threshold = skeleton;
-        loaded.config.integration.sharpness = sharpness;
-        loaded.config.integration.skeleton_weight = 1.0;
+        loaded.config.integration = IntegrationConfig {
+            test,
+            dense_threshold: dense,
+            skeleton_threshold: skeleton,
+            sharpness,
+            skeleton_weight: 1.0,
+        };
         let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
         let method = Method {
             weights: Some(weights),
