@@ -9,7 +9,7 @@ use srrf_baselines::{
 };
 use srrf_cloud::Register;
 use srrf_model::weights::{self, LoadedModel};
-use srrf_model::{NetworkConfig, SrrfRegister, embedded};
+use srrf_model::{BranchKind, NetworkConfig, SrrfRegister, embedded};
 use srrf_refine::{RefineConfig, Refined};
 
 use crate::EvalError;
@@ -101,6 +101,8 @@ pub const METHODS: &[MethodEntry] = &[
             Ok(Method { weights: Some(weights), ..plain(register) })
         })
     },
+    optional("srrf-dense-alone", &["srrf-dense-alone"], |context| alone(context, BranchKind::Dense)),
+    optional("srrf-skeleton-alone", &["srrf-skeleton-alone"], |context| alone(context, BranchKind::Skeleton)),
     MethodEntry {
         holds: UNREFINED,
         ..optional("srrf+refine", &["srrf+refine"], |context| {
@@ -165,6 +167,12 @@ fn srrf(context: &MethodContext) -> Result<(SrrfRegister, String), String> {
     let (loaded, weights) = network(context)?;
     let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
     Ok((SrrfRegister::new(loaded, device), weights))
+}
+
+/// One branch of it in all passes.
+fn alone(context: &MethodContext, branch: BranchKind) -> Result<Method, String> {
+    let (register, weights) = srrf(context)?;
+    Ok(Method { weights: Some(weights), ..plain(register.alone(branch)) })
 }
 
 /// The network of `--weights`, or the one in the program, and where it comes from, in words.

@@ -55,4 +55,4 @@ pub use sem::{LevelConfig, Sem, SemConfig, Skeleton, nearest_distance};
 pub use sem_loss::{SkeletonLoss, SkeletonLossConfig, chamfer, skeleton_loss, spread};
 pub use sfe::{Sfe, SfeConfig};
 pub use sizes::{NetworkConfig, WrongSize};
-pub use srrf::{Srrf, SrrfConfig, SrrfOutput};
+pub use srrf::{BranchKind, Srrf, SrrfConfig, SrrfOutput};

@@ -13,7 +13,7 @@ use crate::inference::InferenceConfig;
 use crate::integration::IntegrationConfig;
 use crate::prior::PositionPrior;
 use crate::sem;
-use crate::srrf::Srrf;
+use crate::srrf::{BranchKind, Srrf};
 use crate::weights::LoadedModel;
 
 /// Which points carry tokens at inference: the middle of each step along the curve.
@@ -28,6 +28,8 @@ pub struct SrrfRegister {
     integration: IntegrationConfig,
     /// Standard deviation of the prior on where matches lie, in the passes after the first one.
     prior: Option<f64>,
+    /// The only branch that runs; both and their integration if none.
+    alone: Option<BranchKind>,
     device: Device,
     /// Largest number of points that the network sees of a cloud; larger clouds are subsampled
     /// evenly. It was trained with 1,024.
@@ -46,7 +48,7 @@ impl SrrfRegister {
         if let Some(tokens) = last_tokens {
             last.dense = last.dense.with_tokens(tokens);
         }
-        Self { model, last, integration, prior, device, max_points: 1024, passes }
+        Self { model, last, integration, prior, alone: None, device, max_points: 1024, passes }
     }
 
     /// A network for a quick look: one pass, with at most `tokens` tokens in the dense branch.
@@ -56,6 +58,13 @@ impl SrrfRegister {
         }
         loaded.config.inference = InferenceConfig::paper();
         Self::new(loaded, device)
+    }
+
+    /// One branch in all passes, without the other and without the integration: what the fused pose is to be
+    /// compared with. Its name is `srrf-dense-alone` or `srrf-skeleton-alone`. (The branches of a [`Registration`] of the
+    /// whole network are no such thing: in all passes but the first they start from the fused pose.)
+    pub fn alone(self, branch: BranchKind) -> Self {
+        Self { alone: Some(branch), ..self }
     }
 
     /// One pass over pairs that all have `points` points a cloud; `placed` says whether a pass before it placed the
@@ -69,6 +78,15 @@ impl SrrfRegister {
         let Some(batch) = PairBatch::new(pairs, &self.device) else { return vec![None; pairs.len()] };
         let prior = self.prior.filter(|_| placed).map(|prior| PositionPrior::new(prior, &batch.frames));
         let (source, target) = (batch.source.clone(), batch.target.clone());
+        if let Some(branch) = self.alone {
+            let found = model.alone(branch, source, target, PHASE, prior.as_ref());
+            let poses = batch.poses(&found.rotation, &found.translation).into_iter();
+            let matches = soft_matches(&found, &batch.frames);
+            return poses
+                .zip(matches)
+                .map(|(pose, matches)| Some(Registration { matches, ..Registration::from_pose(pose?) }))
+                .collect();
+        }
         let output = model.forward_near(&self.integration, source, target, PHASE, prior);
         let fused = batch.poses(&output.fused.rotation, &output.fused.translation);
         let dense = batch.poses(&output.dense.rotation, &output.dense.translation);
@@ -100,7 +118,11 @@ impl SrrfRegister {
 
 impl Register for SrrfRegister {
     fn name(&self) -> &str {
-        "srrf"
+        match self.alone {
+            None => "srrf",
+            Some(BranchKind::Dense) => "srrf-dense-alone",
+            Some(BranchKind::Skeleton) => "srrf-skeleton-alone",
+        }
     }
 
     fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {

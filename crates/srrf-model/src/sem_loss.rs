@@ -19,9 +19,18 @@ pub struct SkeletonLossConfig {
     /// The weight of the distribution distance loss (mean over points; the paper prints a sum). At
     /// 1 the skeleton collapses to its centroid, at 0.25 it keeps its spread.
     pub distribution: f64,
+    /// The weight of the distribution distance over the spread of the target skeleton, which shrinking does not
+    /// lower, so that it may be as large as the distance is to count. Not in the paper; 0 is the paper.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub distribution_over_spread: f64,
     /// The weight of the distance between skeleton points of the same number in both clouds, over
     /// their spread. Not in the paper; 0 is the paper.
     pub index_match: f64,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the form that serde calls")]
+fn is_zero(weight: &f64) -> bool {
+    *weight == 0.0
 }
 
 /// The losses of one batch, each of shape `[1]`.
@@ -35,6 +44,8 @@ pub struct SkeletonLoss {
     pub radius: Tensor<1>,
     /// `L_ddl`, the distribution distance.
     pub distribution: Tensor<1>,
+    /// `L_ddl` over the spread.
+    pub distribution_over_spread: Tensor<1>,
     /// The index-matched distance over the spread.
     pub index_match: Tensor<1>,
     /// The weighted sum.
@@ -72,14 +83,27 @@ pub fn skeleton_loss(
     // L_ddl between the source skeleton under the true pose and the target skeleton.
     let posed = transform(source_skeleton.points.clone(), rotation, translation);
     let distribution = chamfer(posed.clone(), target_skeleton.points.clone());
-    let index_match = index_match(posed, target_skeleton.points.clone());
+    // The spread is on the graph: without its gradient, shrinking the skeleton would be the cheapest way to lower
+    // what is divided by it.
+    let spread = spread(target_skeleton.points.clone()).clamp_min(1e-3);
+    let distribution_over_spread = distribution.clone() / spread.clone();
+    let index_match = index_match(posed, target_skeleton.points.clone()) / spread;
 
     let total = sampling.clone()
         + point_to_sphere.clone() * config.point_to_sphere
         + radius.clone() * config.radius
         + distribution.clone() * config.distribution
+        + distribution_over_spread.clone() * config.distribution_over_spread
         + index_match.clone() * config.index_match;
-    SkeletonLoss { sampling, point_to_sphere, radius, distribution, index_match, total }
+    SkeletonLoss {
+        sampling,
+        point_to_sphere,
+        radius,
+        distribution,
+        distribution_over_spread,
+        index_match,
+        total,
+    }
 }
 
 /// Eight samples on each sphere, `s + r (+-1, +-1, +-1) / sqrt(3)`: `[clouds, 8 m, 3]`.
@@ -107,13 +131,10 @@ fn point_to_sphere(clouds: Tensor<3>, points: Tensor<3>, radii: Tensor<2>) -> Te
     to_sphere + to_cloud
 }
 
-/// Mean distance between skeleton points of the same number, over the spread of the target
-/// skeleton. The spread is on the graph: without its gradient, shrinking the skeleton would be the
-/// cheapest way to lower the loss.
+/// Mean distance between skeleton points of the same number.
 fn index_match(posed: Tensor<3>, target: Tensor<3>) -> Tensor<1> {
     let [batch, m, _] = target.dims();
-    let spread = spread(target.clone()).clamp_min(1e-3);
-    distance((posed - target).reshape([batch * m, 3])).mean() / spread
+    distance((posed - target).reshape([batch * m, 3])).mean()
 }
 
 /// Root mean square distance of the skeleton points from their mean: the number that shows a

@@ -53,6 +53,15 @@ pub struct Srrf {
     pub skeleton: Branch,
 }
 
+/// One of the two branches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BranchKind {
+    /// The branch on the corrupted clouds.
+    Dense,
+    /// The branch on the skeletons.
+    Skeleton,
+}
+
 /// Everything that a reader may want to see.
 #[derive(Debug, Clone)]
 pub struct SrrfOutput {
@@ -106,6 +115,31 @@ impl Srrf {
             stage("integration", || integration.fuse(dense.pose(), skeleton.pose(), &source, &target));
         let (source_skeleton, target_skeleton) = skeletons;
         SrrfOutput { source_skeleton, target_skeleton, dense, skeleton, fused }
+    }
+
+    /// One branch without the other, with a prior on where matches lie in the passes after the first one: what the
+    /// integration is to be compared with.
+    ///
+    /// # Shapes
+    /// - `source`, `target`: `[batch, points, 3]`
+    pub fn alone(
+        &self,
+        which: BranchKind,
+        source: Tensor<3>,
+        target: Tensor<3>,
+        phase: f32,
+        prior: Option<&PositionPrior>,
+    ) -> BranchOutput {
+        let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
+        let (branch, clouds) = match which {
+            BranchKind::Dense => (&self.dense, clouds),
+            BranchKind::Skeleton => {
+                let layout = self.sem.layout(&HostClouds::read(&clouds));
+                (&self.skeleton, self.sem.forward_with(clouds, &layout).detached_points())
+            }
+        };
+        let layout = branch.layout(&HostClouds::read(&clouds), phase);
+        branch.forward_with(clouds, &layout, prior)
     }
 
     /// The stages before the integration, of clouds whose layout is known: the skeletons of source and

@@ -55,8 +55,13 @@ impl Case {
     }
 
     fn skeleton(&self) -> Tensor<1> {
-        let config =
-            SkeletonLossConfig { point_to_sphere: 0.3, radius: 0.4, distribution: 1.0, index_match: 1.0 };
+        let config = SkeletonLossConfig {
+            point_to_sphere: 0.3,
+            radius: 0.4,
+            distribution: 1.0,
+            distribution_over_spread: 1.0,
+            index_match: 1.0,
+        };
         let source = (self.source.clone(), &self.output.source_skeleton);
         let target = (self.target.clone(), &self.output.target_skeleton);
         skeleton_loss(&config, source, target, self.rotation.clone(), self.translation.clone()).total

@@ -122,8 +122,13 @@ impl Lesson {
 
     /// The skeleton module, after Chamfer pre-training and the skeleton losses.
     fn with_skeletons(&self, mut model: Srrf, warm: usize, steps: usize) -> Srrf {
-        let config =
-            SkeletonLossConfig { point_to_sphere: 0.3, radius: 0.4, distribution: 0.25, index_match: 0.25 };
+        let config = SkeletonLossConfig {
+            point_to_sphere: 0.3,
+            radius: 0.4,
+            distribution: 0.25,
+            distribution_over_spread: 0.0,
+            index_match: 0.25,
+        };
         let mut adam = AdamConfig::new().init();
         for step in 0..steps {
             model.sem = model.sem.train();

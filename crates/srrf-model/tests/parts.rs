@@ -5,7 +5,10 @@ mod common;
 
 use burn::tensor::{Device, Tensor};
 use common::{Numbers, difference, tensor, tiny, values};
-use srrf_model::{BranchConfig, Pfi, Sem, Sfe, Skeleton, SoftMatching, init, nearest_distance, spread};
+use srrf_model::{
+    BranchConfig, Pfi, Sem, Sfe, Skeleton, SkeletonLoss, SkeletonLossConfig, SoftMatching, init,
+    nearest_distance, skeleton_loss, spread,
+};
 
 const CLOUDS: usize = 3;
 const POINTS: usize = 61;
@@ -134,6 +137,43 @@ fn nearest_distances_and_spread_are_what_they_say() {
     let cube: Vec<f64> =
         (0..24).map(|i| 5.0 + if (i / 3) >> (i % 3) & 1 == 0 { 1.0 } else { -1.0 }).collect();
     assert!((values(&spread(tensor(&cube, [1, 8, 3], &Device::flex())))[0] - 3.0_f64.sqrt()).abs() < 1e-6);
+}
+
+/// Shrinking both skeletons lowers the distribution distance and leaves it over the spread as it is; a target that shrinks
+/// alone raises the latter.
+#[test]
+fn distribution_distance_over_the_spread_does_not_reward_shrinking() {
+    let device = Device::flex();
+    let config = SkeletonLossConfig {
+        point_to_sphere: 0.0,
+        radius: 0.0,
+        distribution: 0.0,
+        distribution_over_spread: 0.7,
+        index_match: 0.0,
+    };
+    let skeleton = |seed: u64, factor: f64| Skeleton {
+        points: clouds(seed, 1, 19) * factor,
+        radii: Tensor::zeros([1, 19], &device),
+        weights: Tensor::zeros([1, 1, 19], &device),
+        samples: Tensor::zeros([1, 1, 3], &device),
+    };
+    let rotation = tensor(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], [1, 3, 3], &device);
+    let at = |source: f64, target: f64| {
+        let cloud = clouds(5, 1, 40);
+        let (x, y) = (skeleton(3, source), skeleton(4, target));
+        let still = Tensor::zeros([1, 3], &device);
+        skeleton_loss(&config, (cloud.clone(), &x), (cloud, &y), rotation.clone(), still)
+    };
+    let number = |x: &Tensor<1>| values(x)[0];
+    let (whole, half, lone) = (at(1.0, 1.0), at(0.5, 0.5), at(1.0, 0.5));
+    assert!((number(&half.distribution) / number(&whole.distribution) - 0.5).abs() < 1e-4);
+    let over = |loss: &SkeletonLoss| number(&loss.distribution_over_spread);
+    assert!((over(&half) / over(&whole) - 1.0).abs() < 1e-4);
+    assert!(over(&lone) > over(&whole));
+    for loss in [&whole, &half] {
+        let rest = number(&loss.total) - number(&loss.sampling);
+        assert!((rest - 0.7 * over(loss)).abs() < 1e-5);
+    }
 }
 
 fn sfe() -> Sfe {

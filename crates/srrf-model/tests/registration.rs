@@ -10,7 +10,9 @@ use burn::tensor::Device;
 use common::{Numbers, difference, tiny, values};
 use nalgebra::Vector3;
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, SoftMatch};
-use srrf_model::{InferenceConfig, Matches, PairBatch, PairFrame, SrrfConfig, SrrfRegister, init, weights};
+use srrf_model::{
+    BranchKind, InferenceConfig, Matches, PairBatch, PairFrame, SrrfConfig, SrrfRegister, init, weights,
+};
 
 /// Far from the origin, as map coordinates in metres are.
 const UTM: [f64; 3] = [500_000.0, 4_500_000.0, 120.0];
@@ -142,6 +144,26 @@ fn answers_hold_both_branches() {
     assert_eq!(together[0].as_ref().unwrap(), &answer);
     assert_eq!(together[1].as_ref().unwrap(), &network.register(&c, &a).unwrap());
     assert!(network.register_batch(&[]).is_empty());
+}
+
+/// A branch alone is what one gets by hand: its own pose of one pass, applied, and its own pose of the next.
+#[test]
+fn a_branch_alone_starts_each_pass_from_its_own_pose() {
+    let (source, target) = (cloud(13, 61), cloud(14, 61));
+    let once = network_with(InferenceConfig::paper());
+    for (i, which) in [BranchKind::Dense, BranchKind::Skeleton].into_iter().enumerate() {
+        let alone = network().alone(which);
+        assert_eq!(alone.name(), ["srrf-dense-alone", "srrf-skeleton-alone"][i]);
+        let found = alone.register(&source, &target).unwrap();
+        let pose =
+            |source: &PointCloud| once.register(source, &target).unwrap().branches[i].target_from_source;
+        let first = pose(&source);
+        let both = pose(&source.transformed(&first)).compose(&first);
+        assert!(found.target_from_source.angle_to_deg(&both) < 0.01);
+        assert!(image_gap(&source, &found.target_from_source, &both) < 1e-3);
+        // The fused pose, from which the branches of the whole network go on, is another one.
+        assert!(first.angle_to_deg(&once.register(&source, &target).unwrap().target_from_source) > 0.1);
+    }
 }
 
 #[test]

@@ -165,6 +165,7 @@ fn skeleton_terms(
     terms.add("point_to_sphere", loss.point_to_sphere, 0.0);
     terms.add("radius", loss.radius, 0.0);
     terms.add("distribution", loss.distribution, 0.0);
+    terms.add("distribution_over_spread", loss.distribution_over_spread, 0.0);
     terms.add("index_match", loss.index_match, 0.0);
     terms.add("sem", loss.total, 1.0);
 }
