@@ -2,146 +2,240 @@
 //! tokens, inlier test. The test split plays no part. The tables of docs/experiments.md come from
 //!
 //! ```sh
-//! cargo run -p srrf-train --example inference_choices -- configs/modelnet-small.toml WEIGHTS DATA [SEVERITIES [KEEP]]
+//! cargo run -p srrf-train --example inference_choices -- configs/modelnet-gpu-2.toml srrf DATA --rows prior
 //! ```
-//!
-//! `KEEP`, such as 0.8, is the share of each cloud that is kept: the farthest points along a direction of its own.
 
-use std::path::Path;
+use std::path::PathBuf;
 
+use clap::{Parser, ValueEnum};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use srrf_cloud::source::{Split, open};
-use srrf_cloud::{PointCloud, Register};
+use srrf_cloud::{PointCloud, Register, Rigid};
 use srrf_corrupt::crop::{crop, random_direction};
 use srrf_corrupt::{Pair, Severity};
 use srrf_eval::{PairError, Scores};
 use srrf_model::{
-    InferenceConfig, InlierTest, IntegrationConfig, Matches, SrrfRegister, device, keep_freed_memory, weights,
+    BranchKind, InferenceConfig, InlierTest, IntegrationConfig, Matches, SrrfRegister, device, embedded,
+    keep_freed_memory,
 };
 use srrf_train::config::TrainConfig;
 use srrf_train::data::TrainingPairs;
 use srrf_train::step::Workers;
 
+/// Scores the ways to use trained weights on validation pairs.
+#[derive(Parser)]
+struct Arguments {
+    /// The configuration that the weights were trained with.
+    config: PathBuf,
+    /// Name of a network in the program, or a file.
+    weights: String,
+    /// Where ModelNet40 is.
+    data: PathBuf,
+    /// Severities of the pairs.
+    #[arg(long, value_delimiter = ',', default_value = "3")]
+    severities: Vec<u8>,
+    /// Share of each cloud that is kept: the farthest points along a direction of its own.
+    #[arg(long, default_value_t = 1.0)]
+    keep: f64,
+    /// Which rows to score.
+    #[arg(long, value_enum, default_value = "all")]
+    rows: Rows,
+    /// Score each branch alone in all passes, instead of the branches of the whole network, whose passes start
+    /// from the fused pose.
+    #[arg(long)]
+    alone: bool,
+}
+
+/// Parts of the table.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Rows {
+    /// All of them; an hour and more.
+    All,
+    /// Soft matches in all passes.
+    Mean,
+    /// Most probable matches in the last pass.
+    Best,
+    /// The same, with a prior on where matches lie.
+    Prior,
+}
+
+/// An inlier test, and the factor of the skeleton branch's ratio.
+type Test = (InlierTest, f64);
+const NEAREST: Test = (InlierTest::Nearest, 1.0);
+const BOTH: Test = (InlierTest::BothWays, 1.0);
+const SOFT: Test = (InlierTest::SoftMatch, 1.0);
+/// The same test for both, where the skeleton's ratio counts less.
+const FAIR: Test = (InlierTest::BothWays, 0.8);
+
+/// Passes, tokens in them, tokens in the last one, inlier test with the thresholds of the dense and of the skeleton
+/// branch, sharpness.
+type Choice = (usize, usize, usize, Test, f64, f64, f64);
+
+const MEAN: &[Choice] = &[
+    (1, 256, 256, NEAREST, 0.05, 0.05, 1.0),
+    (1, 256, 256, NEAREST, 0.05, 0.05, 16.0),
+    (1, 256, 256, BOTH, 0.05, 0.04, 16.0),
+    (2, 256, 256, NEAREST, 0.05, 0.05, 1.0),
+    (2, 256, 256, NEAREST, 0.05, 0.05, 16.0),
+    (2, 256, 256, NEAREST, 0.05, 0.05, 64.0),
+    (2, 256, 256, NEAREST, 0.03, 0.03, 16.0),
+    (2, 256, 256, NEAREST, 0.02, 0.02, 16.0),
+    (2, 256, 256, NEAREST, 0.08, 0.08, 16.0),
+    (2, 256, 256, SOFT, 0.05, 0.1, 1.0),
+    (3, 256, 256, NEAREST, 0.05, 0.05, 16.0),
+    (2, 256, 256, BOTH, 0.05, 0.05, 4.0),
+    (2, 256, 256, BOTH, 0.05, 0.05, 16.0),
+    (2, 256, 256, BOTH, 0.05, 0.05, 64.0),
+    (2, 256, 256, BOTH, 0.05, 0.04, 16.0),
+    (2, 512, 512, NEAREST, 0.05, 0.05, 16.0),
+    (2, 512, 512, NEAREST, 0.05, 0.04, 16.0),
+    (2, 512, 512, SOFT, 0.05, 0.05, 4.0),
+    (2, 512, 512, BOTH, 0.05, 0.05, 4.0),
+    (2, 512, 512, BOTH, 0.05, 0.05, 16.0),
+    (2, 512, 512, BOTH, 0.05, 0.047, 16.0),
+    (2, 512, 512, BOTH, 0.05, 0.045, 16.0),
+    (2, 512, 512, BOTH, 0.05, 0.04, 16.0),
+    (2, 512, 512, BOTH, 0.05, 0.03, 16.0),
+    (2, 512, 512, BOTH, 0.05, 0.04, 64.0),
+    (2, 512, 512, BOTH, 0.05, 0.03, 64.0),
+    (3, 512, 512, BOTH, 0.05, 0.04, 16.0),
+    (2, 768, 768, BOTH, 0.05, 0.04, 16.0),
+    (2, 512, 1024, BOTH, 0.05, 0.03, 64.0),
+];
+
+const BEST: &[Choice] = &[
+    (1, 256, 256, BOTH, 0.05, 0.03, 64.0),
+    (1, 512, 512, BOTH, 0.05, 0.03, 64.0),
+    (2, 256, 512, BOTH, 0.05, 0.03, 64.0),
+    (2, 256, 1024, BOTH, 0.05, 0.03, 64.0),
+    (2, 512, 512, BOTH, 0.05, 0.03, 64.0),
+    (2, 512, 1024, BOTH, 0.05, 0.03, 64.0),
+    (2, 512, 1024, BOTH, 0.05, 0.05, 16.0),
+    (2, 512, 1024, BOTH, 0.03, 0.03, 16.0),
+    (2, 512, 1024, BOTH, 0.03, 0.03, 64.0),
+    (2, 512, 1024, BOTH, 0.03, 0.02, 64.0),
+    (2, 512, 1024, BOTH, 0.03, 0.01, 256.0),
+    (2, 512, 768, BOTH, 0.05, 0.03, 64.0),
+    (3, 256, 512, BOTH, 0.05, 0.03, 64.0),
+    (3, 256, 1024, BOTH, 0.05, 0.03, 64.0),
+    (3, 256, 1024, BOTH, 0.03, 0.03, 16.0),
+    (3, 256, 1024, BOTH, 0.02, 0.015, 256.0),
+    (3, 128, 1024, BOTH, 0.05, 0.03, 64.0),
+    (4, 256, 1024, BOTH, 0.05, 0.03, 64.0),
+    (5, 256, 1024, BOTH, 0.05, 0.03, 64.0),
+    (3, 256, 1024, BOTH, 0.03, 0.01, 256.0),
+];
+
+/// With the deviation of the prior.
+const PRIOR: &[(f64, Choice)] = &[
+    (0.1, (2, 512, 1024, BOTH, 0.03, 0.01, 256.0)),
+    (0.15, (2, 512, 1024, BOTH, 0.03, 0.01, 256.0)),
+    (0.15, (2, 512, 1024, FAIR, 0.03, 0.03, 64.0)),
+    (0.15, (3, 512, 1024, FAIR, 0.03, 0.03, 64.0)),
+    (0.1, (3, 256, 1024, BOTH, 0.03, 0.01, 256.0)),
+    (0.1, (4, 256, 1024, BOTH, 0.03, 0.01, 256.0)),
+    (0.1, (4, 256, 1024, FAIR, 0.03, 0.03, 64.0)),
+    (0.15, (4, 256, 1024, FAIR, 0.03, 0.03, 64.0)),
+];
+
+/// One row: how the network is used.
+struct Row {
+    tokens: usize,
+    last_tokens: usize,
+    inference: InferenceConfig,
+    integration: IntegrationConfig,
+}
+
+impl Row {
+    fn new(
+        (
+            passes,
+            tokens,
+            last_tokens,
+            (test, skeleton_weight),
+            dense_threshold,
+            skeleton_threshold,
+            sharpness,
+        ): Choice,
+        last_matches: Matches,
+        prior: Option<f64>,
+    ) -> Self {
+        let inference = InferenceConfig { passes, last_tokens: Some(last_tokens), last_matches, prior };
+        let integration =
+            IntegrationConfig { test, dense_threshold, skeleton_threshold, sharpness, skeleton_weight };
+        Self { tokens, last_tokens, inference, integration }
+    }
+
+    fn all(wanted: Rows) -> Vec<Self> {
+        let of = |part: Rows| wanted == part || wanted == Rows::All;
+        let mean = MEAN.iter().map(|&choice| Self::new(choice, Matches::Mean, None));
+        let best = BEST.iter().map(|&choice| Self::new(choice, Matches::Best, None));
+        let prior =
+            PRIOR.iter().map(|&(deviation, choice)| Self::new(choice, Matches::Best, Some(deviation)));
+        let mean = mean.filter(|_| of(Rows::Mean));
+        mean.chain(best.filter(|_| of(Rows::Best))).chain(prior.filter(|_| of(Rows::Prior))).collect()
+    }
+
+    fn describe(&self) -> String {
+        let InferenceConfig { passes, last_matches, prior, .. } = &self.inference;
+        let IntegrationConfig { test, dense_threshold, skeleton_threshold, sharpness, skeleton_weight } =
+            &self.integration;
+        let less = if *skeleton_weight < 1.0 { format!(", times {skeleton_weight}") } else { String::new() };
+        let near = prior.map(|deviation| format!(", prior {deviation}")).unwrap_or_default();
+        let (tokens, last_tokens) = (self.tokens, self.last_tokens);
+        format!(
+            "{passes} | {tokens} | {last_tokens} {last_matches:?}{near} | {test:?} {dense_threshold} \
+             {skeleton_threshold}{less} | {sharpness}"
+        )
+    }
+}
+
 #[allow(clippy::print_stdout, reason = "an example that prints a table")]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     keep_freed_memory();
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [config, weights_path, data, rest @ ..] = arguments.as_slice() else {
-        return Err("usage: inference_choices CONFIG WEIGHTS DATA [SEVERITIES [KEEP]]".into());
-    };
-    let severities = rest.first().map_or("3", String::as_str);
-    let keep: f64 = rest.get(1).map_or(Ok(1.0), |keep| keep.parse())?;
-    let config = <TrainConfig>::read(Path::new(config))?;
-    let pairs = TrainingPairs::new(&config, open(Path::new(data), Split::Train)?)?;
+    let arguments = Arguments::parse();
+    let config = <TrainConfig>::read(&arguments.config)?;
+    let pairs = TrainingPairs::new(&config, open(&arguments.data, Split::Train)?)?;
     let mut held_out: Vec<Pair> = Vec::new();
-    for severity in severities.split(',') {
-        held_out.extend(pairs.validation(Severity::try_from(severity.parse::<u8>()?)?)?);
+    for &severity in &arguments.severities {
+        held_out.extend(pairs.validation(Severity::try_from(severity)?)?);
     }
-    if keep < 1.0 {
-        held_out.iter_mut().enumerate().try_for_each(|(i, pair)| cut(pair, keep, i as u64))?;
+    if arguments.keep < 1.0 {
+        held_out.iter_mut().enumerate().try_for_each(|(i, pair)| cut(pair, arguments.keep, i as u64))?;
     }
     let workers = Workers::new(std::thread::available_parallelism().map_or(1, usize::from))?;
     println!(
-        "{}; {} pairs at severity {severities}, {keep} of each cloud kept; RMSE / MAE / median of R in degrees",
+        "{}; {} pairs at severities {:?}, {} of each cloud kept; RMSE / MAE / median of R in degrees",
         pairs.description(),
-        held_out.len()
+        held_out.len(),
+        arguments.severities,
+        arguments.keep
     );
+    let columns: &[&str] = match arguments.alone {
+        true => &["dense alone", "skeleton alone"],
+        false => &["dense", "skeleton", "fused", "the better branch"],
+    };
     println!(
-        "| passes | tokens | last pass | inlier test | sharpness | dense | skeleton | fused | the better branch |\n\
-         |---|---|---|---|---|---|---|---|---|"
+        "| passes | tokens | last pass | inlier test | sharpness | {} |\n|{}",
+        columns.join(" | "),
+        "---|".repeat(5 + columns.len())
     );
-    let (nearest, both, soft) =
-        ((InlierTest::Nearest, 1.0), (InlierTest::BothWays, 1.0), (InlierTest::SoftMatch, 1.0));
-    // The same test for both, where the skeleton's ratio counts less.
-    let fair = (InlierTest::BothWays, 0.8);
-    // Number of passes, tokens in them; tokens and matches in the last one, and the prior of all but the first; inlier
-    // test.
-    let mean = |tokens| (tokens, Matches::Mean, None);
-    let best = |tokens| (tokens, Matches::Best, None);
-    let near = |tokens, deviation| (tokens, Matches::Best, Some(deviation));
-    for (
-        passes,
-        tokens,
-        (last_tokens, matches, prior),
-        (test, skeleton_weight),
-        dense_threshold,
-        skeleton_threshold,
-        sharpness,
-    ) in [
-        (1, 256, mean(256), nearest, 0.05, 0.05, 1.0),
-        (1, 256, mean(256), nearest, 0.05, 0.05, 16.0),
-        (1, 256, mean(256), both, 0.05, 0.04, 16.0),
-        (2, 256, mean(256), nearest, 0.05, 0.05, 1.0),
-        (2, 256, mean(256), nearest, 0.05, 0.05, 16.0),
-        (2, 256, mean(256), nearest, 0.05, 0.05, 64.0),
-        (2, 256, mean(256), nearest, 0.03, 0.03, 16.0),
-        (2, 256, mean(256), nearest, 0.02, 0.02, 16.0),
-        (2, 256, mean(256), nearest, 0.08, 0.08, 16.0),
-        (2, 256, mean(256), soft, 0.05, 0.1, 1.0),
-        (3, 256, mean(256), nearest, 0.05, 0.05, 16.0),
-        (2, 256, mean(256), both, 0.05, 0.05, 4.0),
-        (2, 256, mean(256), both, 0.05, 0.05, 16.0),
-        (2, 256, mean(256), both, 0.05, 0.05, 64.0),
-        (2, 256, mean(256), both, 0.05, 0.04, 16.0),
-        (2, 512, mean(512), nearest, 0.05, 0.05, 16.0),
-        (2, 512, mean(512), nearest, 0.05, 0.04, 16.0),
-        (2, 512, mean(512), soft, 0.05, 0.05, 4.0),
-        (2, 512, mean(512), both, 0.05, 0.05, 4.0),
-        (2, 512, mean(512), both, 0.05, 0.05, 16.0),
-        (2, 512, mean(512), both, 0.05, 0.047, 16.0),
-        (2, 512, mean(512), both, 0.05, 0.045, 16.0),
-        (2, 512, mean(512), both, 0.05, 0.04, 16.0),
-        (2, 512, mean(512), both, 0.05, 0.03, 16.0),
-        (2, 512, mean(512), both, 0.05, 0.04, 64.0),
-        (2, 512, mean(512), both, 0.05, 0.03, 64.0),
-        (3, 512, mean(512), both, 0.05, 0.04, 16.0),
-        (2, 768, mean(768), both, 0.05, 0.04, 16.0),
-        (1, 256, best(256), both, 0.05, 0.03, 64.0),
-        (1, 512, best(512), both, 0.05, 0.03, 64.0),
-        (2, 256, best(512), both, 0.05, 0.03, 64.0),
-        (2, 256, best(1024), both, 0.05, 0.03, 64.0),
-        (2, 512, best(512), both, 0.05, 0.03, 64.0),
-        (2, 512, mean(1024), both, 0.05, 0.03, 64.0),
-        (2, 512, best(1024), both, 0.05, 0.03, 64.0),
-        (2, 512, best(1024), both, 0.05, 0.05, 16.0),
-        (2, 512, best(1024), both, 0.03, 0.03, 16.0),
-        (2, 512, best(1024), both, 0.03, 0.03, 64.0),
-        (2, 512, best(1024), both, 0.03, 0.02, 64.0),
-        (2, 512, best(1024), both, 0.03, 0.01, 256.0),
-        (2, 512, best(768), both, 0.05, 0.03, 64.0),
-        (3, 256, best(512), both, 0.05, 0.03, 64.0),
-        (3, 256, best(1024), both, 0.05, 0.03, 64.0),
-        (3, 256, best(1024), both, 0.03, 0.03, 16.0),
-        (3, 256, best(1024), both, 0.02, 0.015, 256.0),
-        (3, 128, best(1024), both, 0.05, 0.03, 64.0),
-        (4, 256, best(1024), both, 0.05, 0.03, 64.0),
-        (5, 256, best(1024), both, 0.05, 0.03, 64.0),
-        (3, 256, best(1024), both, 0.03, 0.01, 256.0),
-        (2, 512, near(1024, 0.1), both, 0.03, 0.01, 256.0),
-        (2, 512, near(1024, 0.15), both, 0.03, 0.01, 256.0),
-        (2, 512, near(1024, 0.15), fair, 0.03, 0.03, 64.0),
-        (3, 512, near(1024, 0.15), fair, 0.03, 0.03, 64.0),
-        (3, 256, near(1024, 0.1), both, 0.03, 0.01, 256.0),
-        (4, 256, near(1024, 0.1), both, 0.03, 0.01, 256.0),
-        (4, 256, near(1024, 0.1), fair, 0.03, 0.03, 64.0),
-        (4, 256, near(1024, 0.15), fair, 0.03, 0.03, 64.0),
-    ] {
+    for row in Row::all(arguments.rows) {
         let device = device("flex")?;
-        let mut loaded = weights::load(Path::new(weights_path), &device)?;
-        loaded.model.dense = loaded.model.dense.with_tokens(tokens);
-        loaded.config.integration =
-            IntegrationConfig { test, dense_threshold, skeleton_threshold, sharpness, skeleton_weight };
-        loaded.config.inference =
-            InferenceConfig { passes, last_tokens: Some(last_tokens), last_matches: matches, prior };
-        let method = SrrfRegister::new(loaded, device);
-        let less = if skeleton_weight < 1.0 { format!(", times {skeleton_weight}") } else { String::new() };
-        let near = prior.map(|deviation| format!(", prior {deviation}")).unwrap_or_default();
-        let rows = score(&method, &held_out, &workers)?;
-        println!(
-            "| {passes} | {tokens} | {last_tokens} {matches:?}{near} | {test:?} {dense_threshold} {skeleton_threshold}{less} | {sharpness} | {} |",
-            rows.join(" | ")
-        );
+        let mut loaded = embedded::open(&arguments.weights, &device)?;
+        loaded.model.dense = loaded.model.dense.with_tokens(row.tokens);
+        loaded.config.integration = row.integration.clone();
+        loaded.config.inference = row.inference.clone();
+        let network = || SrrfRegister::new(loaded.clone(), device.clone());
+        let scores = match arguments.alone {
+            true => {
+                let alone = |branch| score(&network().alone(branch), &held_out, &workers);
+                [alone(BranchKind::Dense)?, alone(BranchKind::Skeleton)?].concat()
+            }
+            false => score(&network(), &held_out, &workers)?,
+        };
+        println!("| {} | {} |", row.describe(), scores.join(" | "));
     }
     Ok(())
 }
@@ -156,33 +250,37 @@ fn cut(pair: &mut Pair, keep: f64, seed: u64) -> Result<(), srrf_cloud::CloudErr
     Ok(())
 }
 
-/// Dense, skeleton and fused poses of a method, and of the two branches the one that the truth prefers, as `RMSE / MAE /
-/// median`.
+/// `RMSE / MAE / median` of the poses of a method: where it has branches of the dense one, of the skeleton one, of the fused
+/// one, and of that branch of each pair which the truth prefers; its own pose alone where it has none.
 fn score(
     method: &SrrfRegister,
     pairs: &[Pair],
     workers: &Workers,
 ) -> Result<Vec<String>, Box<dyn std::error::Error>> {
-    let clouds = |pair: &Pair| -> (PointCloud, PointCloud) { (pair.source.clone(), pair.target.clone()) };
     let answers = workers
-        .map(pairs.len(), |i| {
-            let (source, target) = clouds(&pairs[i]);
-            let answer = method.register(&source, &target).ok()?;
-            let branch = |b: usize| answer.branches.get(b).map(|branch| branch.target_from_source);
-            let off = |b: usize| branch(b).map(|pose| pose.angle_to_deg(&pairs[i].target_from_source));
-            let better = usize::from(off(1) < off(0));
-            Some([branch(0), branch(1), Some(answer.target_from_source), branch(better)])
-        })
+        .map(pairs.len(), |i| method.register(&pairs[i].source, &pairs[i].target).ok())
         .ok_or("a worker stopped")?;
-    (0..4)
-        .map(|row| {
-            let errors: Vec<PairError> = pairs
-                .iter()
-                .zip(&answers)
-                .map(|(pair, poses)| {
-                    PairError::new(poses.and_then(|p| p[row]).as_ref(), &pair.target_from_source)
-                })
-                .collect();
+    let columns: Vec<Vec<Option<Rigid>>> = match answers.iter().flatten().any(|a| !a.branches.is_empty()) {
+        false => vec![answers.iter().map(|a| Some(a.as_ref()?.target_from_source)).collect()],
+        true => {
+            let rows = answers.iter().zip(pairs).map(|(answer, pair)| {
+                let branch = |b: usize| Some(answer.as_ref()?.branches.get(b)?.target_from_source);
+                let off = |b: usize| branch(b).map(|pose| pose.angle_to_deg(&pair.target_from_source));
+                let better = usize::from(off(1) < off(0));
+                let fused = answer.as_ref().map(|a| a.target_from_source);
+                [branch(0), branch(1), fused, branch(better)]
+            });
+            let rows: Vec<[Option<Rigid>; 4]> = rows.collect();
+            (0..4).map(|column| rows.iter().map(|row| row[column]).collect()).collect()
+        }
+    };
+    columns
+        .iter()
+        .map(|poses| {
+            let of_pair = |(pair, pose): (&Pair, &Option<Rigid>)| {
+                PairError::new(pose.as_ref(), &pair.target_from_source)
+            };
+            let errors: Vec<PairError> = pairs.iter().zip(poses).map(of_pair).collect();
             let s = Scores::from_errors(&errors)?;
             Ok(format!("{:.2} / {:.2} / {:.2}", s.rmse_r, s.mae_r, s.median_rot_deg))
         })
