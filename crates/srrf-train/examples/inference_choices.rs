@@ -11,7 +11,7 @@ use clap::{Parser, ValueEnum};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use srrf_cloud::source::{Split, open};
-use srrf_cloud::{PointCloud, Register, Rigid};
+use srrf_cloud::{PointCloud, Register, Registration, Rigid};
 use srrf_corrupt::crop::{crop, random_direction};
 use srrf_corrupt::{Pair, Severity};
 use srrf_eval::{PairError, Scores};
@@ -142,7 +142,6 @@ const PRIOR: &[(f64, Choice)] = &[
 /// One row: how the network is used.
 struct Row {
     tokens: usize,
-    last_tokens: usize,
     inference: InferenceConfig,
     integration: IntegrationConfig,
 }
@@ -164,7 +163,7 @@ impl Row {
         let inference = InferenceConfig { passes, last_tokens: Some(last_tokens), last_matches, prior };
         let integration =
             IntegrationConfig { test, dense_threshold, skeleton_threshold, sharpness, skeleton_weight };
-        Self { tokens, last_tokens, inference, integration }
+        Self { tokens, inference, integration }
     }
 
     fn all(wanted: Rows) -> Vec<Self> {
@@ -178,12 +177,12 @@ impl Row {
     }
 
     fn describe(&self) -> String {
-        let InferenceConfig { passes, last_matches, prior, .. } = &self.inference;
+        let InferenceConfig { passes, last_tokens, last_matches, prior } = &self.inference;
         let IntegrationConfig { test, dense_threshold, skeleton_threshold, sharpness, skeleton_weight } =
             &self.integration;
         let less = if *skeleton_weight < 1.0 { format!(", times {skeleton_weight}") } else { String::new() };
         let near = prior.map(|deviation| format!(", prior {deviation}")).unwrap_or_default();
-        let (tokens, last_tokens) = (self.tokens, self.last_tokens);
+        let (tokens, last_tokens) = (self.tokens, last_tokens.unwrap_or(self.tokens));
         format!(
             "{passes} | {tokens} | {last_tokens} {last_matches:?}{near} | {test:?} {dense_threshold} \
              {skeleton_threshold}{less} | {sharpness}"
@@ -230,10 +229,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let network = || SrrfRegister::new(loaded.clone(), device.clone());
         let scores = match arguments.alone {
             true => {
-                let alone = |branch| score(&network().alone(branch), &held_out, &workers);
+                let alone = |branch| score(&network().alone(branch), &held_out, &workers, own);
                 [alone(BranchKind::Dense)?, alone(BranchKind::Skeleton)?].concat()
             }
-            false => score(&network(), &held_out, &workers)?,
+            false => score(&network(), &held_out, &workers, of_both)?,
         };
         println!("| {} | {} |", row.describe(), scores.join(" | "));
     }
@@ -250,37 +249,44 @@ fn cut(pair: &mut Pair, keep: f64, seed: u64) -> Result<(), srrf_cloud::CloudErr
     Ok(())
 }
 
-/// `RMSE / MAE / median` of the poses of a method: where it has branches of the dense one, of the skeleton one, of the fused
-/// one, and of that branch of each pair which the truth prefers; its own pose alone where it has none.
-fn score(
+/// The poses of an answer that are scored, one a column; the truth is there to choose by.
+type Columns<const N: usize> = fn(&Registration, &Rigid) -> [Option<Rigid>; N];
+
+/// The pose itself.
+fn own(answer: &Registration, _: &Rigid) -> [Option<Rigid>; 1] {
+    [Some(answer.target_from_source)]
+}
+
+/// The dense, the skeleton and the fused pose, and of the two branches the one that the truth prefers.
+fn of_both(answer: &Registration, truth: &Rigid) -> [Option<Rigid>; 4] {
+    let branch = |b: usize| answer.branches.get(b).map(|branch| branch.target_from_source);
+    let off = |b: usize| branch(b).map(|pose| pose.angle_to_deg(truth));
+    let better = usize::from(off(1) < off(0));
+    [branch(0), branch(1), Some(answer.target_from_source), branch(better)]
+}
+
+/// `RMSE / MAE / median` of each column.
+fn score<const N: usize>(
     method: &SrrfRegister,
     pairs: &[Pair],
     workers: &Workers,
+    columns: Columns<N>,
 ) -> Result<Vec<String>, Box<dyn std::error::Error>> {
     let answers = workers
-        .map(pairs.len(), |i| method.register(&pairs[i].source, &pairs[i].target).ok())
+        .map(pairs.len(), |i| {
+            let answer = method.register(&pairs[i].source, &pairs[i].target).ok()?;
+            Some(columns(&answer, &pairs[i].target_from_source))
+        })
         .ok_or("a worker stopped")?;
-    let columns: Vec<Vec<Option<Rigid>>> = match answers.iter().flatten().any(|a| !a.branches.is_empty()) {
-        false => vec![answers.iter().map(|a| Some(a.as_ref()?.target_from_source)).collect()],
-        true => {
-            let rows = answers.iter().zip(pairs).map(|(answer, pair)| {
-                let branch = |b: usize| Some(answer.as_ref()?.branches.get(b)?.target_from_source);
-                let off = |b: usize| branch(b).map(|pose| pose.angle_to_deg(&pair.target_from_source));
-                let better = usize::from(off(1) < off(0));
-                let fused = answer.as_ref().map(|a| a.target_from_source);
-                [branch(0), branch(1), fused, branch(better)]
-            });
-            let rows: Vec<[Option<Rigid>; 4]> = rows.collect();
-            (0..4).map(|column| rows.iter().map(|row| row[column]).collect()).collect()
-        }
-    };
-    columns
-        .iter()
-        .map(|poses| {
-            let of_pair = |(pair, pose): (&Pair, &Option<Rigid>)| {
-                PairError::new(pose.as_ref(), &pair.target_from_source)
-            };
-            let errors: Vec<PairError> = pairs.iter().zip(poses).map(of_pair).collect();
+    (0..N)
+        .map(|column| {
+            let errors: Vec<PairError> = pairs
+                .iter()
+                .zip(&answers)
+                .map(|(pair, poses)| {
+                    PairError::new(poses.and_then(|p| p[column]).as_ref(), &pair.target_from_source)
+                })
+                .collect();
             let s = Scores::from_errors(&errors)?;
             Ok(format!("{:.2} / {:.2} / {:.2}", s.rmse_r, s.mae_r, s.median_rot_deg))
         })
