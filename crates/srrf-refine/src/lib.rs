@@ -21,6 +21,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod affine;
 mod config;
 mod deformation;
 mod evidence;
@@ -33,6 +34,7 @@ mod soft;
 mod solve;
 mod target;
 
+pub use affine::AffineFit;
 pub use config::{Deformed, Metric, RefineConfig, RefineError};
 pub use deformation::ResidualStructure;
 pub use evidence::Evidence;

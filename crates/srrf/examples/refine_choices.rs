@@ -3,8 +3,8 @@
 //! refinement, of a cautious one, of halfway between the network and that, and of the answer by the rule, beside
 //! what the rule sees.
 //!
-//! `cargo run --release -p srrf --example refine_choices -- MODELNET [EVERY] > choices.csv` takes every so many of these shapes
-//! (default: each); every other one of them gives its place to a built-in shape.
+//! `cargo run --release -p srrf --example refine_choices -- MODELNET [EVERY [CORRUPTION]] > choices.csv` takes every so many of
+//! these shapes (default: each); every other one of the 192 gives its place to a built-in shape, so an even number takes none of those.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
 
 use std::path::Path;
@@ -24,10 +24,11 @@ const VALIDATION: usize = 192;
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let Some(data) = arguments.next() else {
-        println!("usage: refine_choices MODELNET [EVERY]");
+        println!("usage: refine_choices MODELNET [EVERY [CORRUPTION]]");
         return;
     };
     let every: usize = arguments.next().map_or(1, |n| n.parse().unwrap());
+    let only = arguments.next();
     let shapes = open(Path::new(&data), Split::Train).unwrap();
     let flex = device("flex").unwrap();
     let network = SrrfRegister::new(embedded::load_default(&flex).unwrap(), flex);
@@ -39,11 +40,12 @@ fn main() {
 
     println!(
         "corruption,sampling,severity,shape,class,start,full,cautious,halfway,rule,verdict,normal_correlation,correlation,median,\
-         support_start,support_full,support_cautious,fitness,inlier_rmse,moved_full,moved_cautious,wide,fused_halfway"
+         support_start,support_full,support_cautious,fitness,inlier_rmse,moved_full,moved_cautious,wide,fused_halfway,bend,affine_gain"
     );
     let lines: Vec<String> = (0..VALIDATION * CorruptionKind::ALL.len())
         .into_par_iter()
         .filter(|i| (i / CorruptionKind::ALL.len()).is_multiple_of(every))
+        .filter(|i| only.as_ref().is_none_or(|name| CorruptionKind::ALL[i % 12].name() == name))
         .map(|i| {
             let (shape, kind) = (i / CorruptionKind::ALL.len(), CorruptionKind::ALL[i % 12]);
             let severity = Severity::ALL[(shape + i) % 5];
@@ -84,7 +86,7 @@ fn main() {
                 (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>() / 3.0
             };
             format!(
-                "{},{},{},{index},{},{:.6},{:.6},{:.6},{:.6},{:.6},{},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.6},{:.4},{:.4},{:.4},{:.6}",
+                "{},{},{},{index},{},{:.6},{:.6},{:.6},{:.6},{:.6},{},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.6},{:.4},{:.4},{:.4},{:.6},{:.4},{:.4}",
                 kind.name(),
                 if independent { "independent" } else { "shared" },
                 severity.get(),
@@ -111,6 +113,8 @@ fn main() {
                 start.angle_to_deg(&cautious.target_from_source),
                 full.residuals.wide_correlation,
                 error(&fused_halfway),
+                rule.affine.map_or(f64::NAN, |fit| fit.bend),
+                rule.affine.map_or(f64::NAN, |fit| fit.gain),
             )
         })
         .collect();
