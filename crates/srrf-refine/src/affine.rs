@@ -4,7 +4,8 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use serde::Serialize;
 use srrf_cloud::Rigid;
 
-use crate::matching::median_distance;
+use crate::Metric;
+use crate::matching::{median_distance, support_of};
 use crate::prepared::Level;
 
 /// Iterations of the fit.
@@ -15,8 +16,6 @@ const SHRINK: f64 = 0.85;
 const END: f64 = 0.5;
 /// Pull towards the rigid pose, as a share of the mean diagonal: keeps directions that no match tells.
 const PULL: f64 = 1e-3;
-/// The metric of a match, `a I + b n n^T`, as [`crate::Metric::Both`].
-const METRIC: (f64, f64) = (0.1, 1.0);
 
 /// What an affine map fits better than a rigid pose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -41,8 +40,8 @@ impl Affine {
     }
 }
 
-/// Fits an affine map from `pose` on and compares.
-pub(crate) fn affine_fit(source: &Level, target: &Level, pose: &Rigid) -> AffineFit {
+/// Fits an affine map from `pose` on and compares; `support` is that of the pose.
+pub(crate) fn affine_fit(source: &Level, target: &Level, pose: &Rigid, support: f64) -> AffineFit {
     let spacing = source.spacing.max(target.spacing);
     let end = END * spacing;
     let mut scale = (2.0 * median_distance(source, target, pose)).max(2.0 * spacing);
@@ -55,7 +54,7 @@ pub(crate) fn affine_fit(source: &Level, target: &Level, pose: &Rigid) -> Affine
     }
     AffineFit {
         bend: bend(source, &map) / spacing,
-        gain: support(source, target, &map, spacing) - support(source, target, &rigid, spacing),
+        gain: support_of_map(source, target, &map, spacing) - support,
     }
 }
 
@@ -82,9 +81,10 @@ fn step(source: &Level, target: &Level, map: &Affine, rigid: &Affine, scale: f64
     let mut hessian = SMatrix::<f64, 12, 12>::zeros();
     let mut right = SVector::<f64, 12>::zeros();
     let squared = scale * scale;
+    let (a, b) = Metric::Both.weights();
     for [x, moved, fixed, normal] in matches(source, target, map)? {
         let w = squared / (squared + (moved - fixed).norm_squared());
-        let (a, b) = (METRIC.0 * w * w, METRIC.1 * w * w);
+        let (a, b) = (a * w * w, b * w * w);
         // The unknowns are the rows of [linear | shift]: r = U h - y with h = (x, 1).
         let h = x.push(1.0);
         let metric = a * Matrix3::identity() + b * normal * normal.transpose();
@@ -134,16 +134,12 @@ fn bend(source: &Level, map: &Affine) -> f64 {
 }
 
 /// [`crate::matching::support`] of an affine map.
-fn support(source: &Level, target: &Level, map: &Affine, spacing: f64) -> f64 {
+fn support_of_map(source: &Level, target: &Level, map: &Affine, spacing: f64) -> f64 {
     let Some(matches) = matches(source, target, map) else { return 0.0 };
-    let scales = [1.0, 0.3, 0.1].map(|s| (s * spacing) * (s * spacing));
-    let score = |m: &[Vector3<f64>; 4]| {
-        let r = (m[1] - m[2]).norm_squared();
-        scales.iter().map(|s| s / (s + r)).sum::<f64>() / 3.0
-    };
-    let (from_source, from_target) = matches.split_at(source.points().len());
-    let mean = |side: &[[Vector3<f64>; 4]]| side.iter().map(score).sum::<f64>() / side.len() as f64;
-    0.5 * (mean(from_source) + mean(from_target))
+    let squared: Vec<f64> =
+        matches.iter().map(|[_, moved, fixed, _]| (moved - fixed).norm_squared()).collect();
+    let (from_source, from_target) = squared.split_at(source.points().len());
+    support_of(from_source, from_target, spacing)
 }
 
 #[cfg(test)]
@@ -156,6 +152,7 @@ mod tests {
 
     use super::*;
     use crate::RefineConfig;
+    use crate::matching::support;
     use crate::prepared::{Prepared, to_local};
 
     /// A pair that samples one shape twice.
@@ -180,7 +177,9 @@ mod tests {
     fn between(source: &PointCloud, target: &PointCloud, pose: &Rigid) -> AffineFit {
         let prepared = |cloud| Prepared::new(cloud, &RefineConfig::default()).unwrap();
         let (source, target) = (prepared(source), prepared(target));
-        affine_fit(source.coarse(), target.coarse(), &to_local(pose, &source, &target))
+        let (source, target, pose) = (source.coarse(), target.coarse(), to_local(pose, &source, &target));
+        let support = support(source, target, &pose, source.spacing.max(target.spacing));
+        affine_fit(source, target, &pose, support)
     }
 
     #[test]

@@ -108,17 +108,21 @@ pub(crate) fn median_distance(source: &Level, target: &Level, pose: &Rigid) -> f
     all.select_nth_unstable_by(middle, f64::total_cmp).1.sqrt()
 }
 
-/// How well a pose is supported, in [0, 1]: the mean over both clouds of `s^2 / (s^2 + r^2)`, `r` the
-/// distance to the nearest point of the other cloud, and over three scales `s` of `spacing`: 1, 0.3
-/// and 0.1. Both clouds count alike, whatever their sizes.
+/// How well a pose is supported, by [`support_of`] the distances of its matches.
 pub(crate) fn support(source: &Level, target: &Level, pose: &Rigid, spacing: f64) -> f64 {
+    let [from_source, from_target] = squared_distances(source, target, pose);
+    support_of(&from_source, &from_target, spacing)
+}
+
+/// Support in [0, 1] of squared distances to the nearest point of the other cloud: the mean over both clouds of
+/// `s^2 / (s^2 + r^2)`, over three scales `s` of `spacing`: 1, 0.3 and 0.1. Both clouds count alike, whatever their sizes.
+pub(crate) fn support_of(from_source: &[f64], from_target: &[f64], spacing: f64) -> f64 {
     let scales = [1.0, 0.3, 0.1].map(|s| (s * spacing) * (s * spacing));
     let mean = |squared: &[f64]| {
         let sum: f64 = squared.iter().map(|r| scales.iter().map(|s| s / (s + r)).sum::<f64>() / 3.0).sum();
         sum / squared.len() as f64
     };
-    let [from_source, from_target] = squared_distances(source, target, pose);
-    0.5 * (mean(&from_source) + mean(&from_target))
+    0.5 * (mean(from_source) + mean(from_target))
 }
 
 /// How far `next` moves the cloud of this radius against `pose`.

@@ -146,7 +146,7 @@ impl Run<'_> {
         let asked = self.config.check_deformation && small && residuals.median > COINCIDENT;
         let bent = residuals.wide_correlation > DEFORMED_CORRELATION || wandered;
         let affine = (asked && knows_shapes && !bent)
-            .then(|| affine_fit(self.source.coarse(), self.target.coarse(), &stage.pose));
+            .then(|| affine_fit(self.source.coarse(), self.target.coarse(), &stage.pose, support));
         let sheared = affine.is_some_and(|fit| fit.bend > SHEARED_BEND && fit.gain > SHEARED_GAIN);
         if asked && (bent || sheared) {
             let cautious = self.cautious_run(&start);

@@ -152,6 +152,25 @@ fn a_start_that_knows_shapes_is_not_left_by_a_wide_turn_unless_points_coincide()
 }
 
 #[test]
+fn a_shear_that_fits_like_a_rigid_pair_is_told_by_an_affine_map() {
+    let sheared = pair(CorruptionKind::Shear, 2, 1024, 10);
+    let start = sheared.target_from_source;
+    let by = |config| refine(&sheared.source, &sheared.target, &[("start", start)], &config).unwrap();
+    let known = by(RefineConfig::default());
+    assert!(known.residuals.wide_correlation < 0.09, "{:?}", known.residuals);
+    assert!(known.affine.is_some_and(|fit| fit.bend > 2.0 && fit.gain > 0.3), "{:?}", known.affine);
+    assert_eq!((known.verdict, known.target_from_source), (Verdict::Deformed, start));
+    // Who knows no shapes is not asked, nor who wants no check.
+    for config in [
+        RefineConfig { deformed: Deformed::Halfway, ..RefineConfig::default() },
+        RefineConfig { check_deformation: false, ..RefineConfig::default() },
+    ] {
+        let found = by(config);
+        assert_eq!((found.verdict, found.affine), (Verdict::Rigid, None));
+    }
+}
+
+#[test]
 fn a_prepared_target_serves_many_sources() {
     let pair = pair(CorruptionKind::Upsampling, 2, 501, 5);
     let target = RefineTarget::new(&pair.target, &RefineConfig::default()).unwrap();

@@ -28,7 +28,7 @@ fn main() {
         return;
     };
     let every: usize = arguments.next().map_or(1, |n| n.parse().unwrap());
-    let only = arguments.next();
+    let only: Option<CorruptionKind> = arguments.next().map(|name| name.parse().unwrap());
     let shapes = open(Path::new(&data), Split::Train).unwrap();
     let flex = device("flex").unwrap();
     let network = SrrfRegister::new(embedded::load_default(&flex).unwrap(), flex);
@@ -45,7 +45,7 @@ fn main() {
     let lines: Vec<String> = (0..VALIDATION * CorruptionKind::ALL.len())
         .into_par_iter()
         .filter(|i| (i / CorruptionKind::ALL.len()).is_multiple_of(every))
-        .filter(|i| only.as_ref().is_none_or(|name| CorruptionKind::ALL[i % 12].name() == name))
+        .filter(|i| only.is_none_or(|kind| CorruptionKind::ALL[i % 12] == kind))
         .map(|i| {
             let (shape, kind) = (i / CorruptionKind::ALL.len(), CorruptionKind::ALL[i % 12]);
             let severity = Severity::ALL[(shape + i) % 5];
