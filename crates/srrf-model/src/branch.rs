@@ -6,7 +6,7 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::confidence::Confidence;
-use crate::geometry::{HostClouds, rows};
+use crate::geometry::{HostClouds, rows_at};
 use crate::inference::Matches;
 use crate::integration::BranchPose;
 use crate::layout::BranchLayout;
@@ -132,7 +132,10 @@ impl Branch {
         let [both, points, _] = clouds.dims();
         let (batch, n) = (both / 2, layout.per_cloud);
         let tokens = match &layout.tokens {
-            Some(chosen) => rows(clouds.clone().reshape([both * points, 3]), chosen).reshape([both, n, 3]),
+            Some(chosen) => {
+                let chosen = chosen.on(&clouds.device());
+                rows_at(clouds.clone().reshape([both * points, 3]), chosen).reshape([both, n, 3])
+            }
             None => clouds.clone(),
         };
         let device = tokens.device();

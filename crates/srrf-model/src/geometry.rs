@@ -326,14 +326,44 @@ fn morton(x: u32, y: u32, z: u32) -> u32 {
 
 /// The rows `indices` of `table`, shape `[rows, channels]` to `[indices.len(), channels]`.
 pub fn rows(table: Tensor<2>, indices: &[i64]) -> Tensor<2> {
-    let indices = row_numbers(indices, &table);
+    let indices = on_device(indices, &table.device());
     rows_at(table, indices)
 }
 
-/// Row numbers on the device of `table`, for [`rows_at`].
-pub fn row_numbers(indices: &[i64], table: &Tensor<2>) -> Tensor<1, Int> {
-    let device = table.device().without_autodiff();
+/// Row numbers on a device.
+fn on_device(indices: &[i64], device: &Device) -> Tensor<1, Int> {
+    let device = device.clone().without_autodiff();
     Tensor::from_data(TensorData::new(indices.to_vec(), [indices.len()]), &device)
+}
+
+/// Row numbers for [`rows_at`], found on the host. They may be sent to the device that needs them ahead of their use, for
+/// such a copy waits until a GPU has done all that it was given before.
+#[derive(Debug, Clone)]
+pub struct RowNumbers {
+    host: Vec<i64>,
+    sent: Option<Tensor<1, Int>>,
+}
+
+impl RowNumbers {
+    /// Row numbers on the host.
+    pub fn new(host: Vec<i64>) -> Self {
+        Self { host, sent: None }
+    }
+
+    /// The numbers.
+    pub fn host(&self) -> &[i64] {
+        &self.host
+    }
+
+    /// Sends them to `device`.
+    pub fn send(&mut self, device: &Device) {
+        self.sent = Some(on_device(&self.host, device));
+    }
+
+    /// The numbers on `device`, which is the one they were sent to, if they were.
+    pub fn on(&self, device: &Device) -> Tensor<1, Int> {
+        self.sent.clone().unwrap_or_else(|| on_device(&self.host, device))
+    }
 }
 
 /// The rows `indices` of `table`, shape `[rows, channels]` to `[indices, channels]`.

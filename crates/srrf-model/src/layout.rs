@@ -3,7 +3,9 @@
 //! step that uses it, while a GPU is busy with the one before.
 
 use crate::branch::BranchConfig;
-use crate::geometry::{HostClouds, farthest_points, flat_indices, k_nearest, token_rows};
+use burn::tensor::Device;
+
+use crate::geometry::{HostClouds, RowNumbers, farthest_points, flat_indices, k_nearest, token_rows};
 use crate::prior::PositionPrior;
 use crate::sem::{LevelConfig, SemConfig};
 use crate::srrf::SrrfConfig;
@@ -26,7 +28,7 @@ pub struct SrrfLayout {
 #[derive(Debug, Clone)]
 pub struct BranchLayout {
     /// Rows of the points that carry tokens; none where every point does.
-    pub(crate) tokens: Option<Vec<i64>>,
+    pub(crate) tokens: Option<RowNumbers>,
     /// Tokens a cloud.
     pub(crate) per_cloud: usize,
     /// Neighbours of the tokens.
@@ -37,9 +39,9 @@ pub struct BranchLayout {
 #[derive(Debug, Clone)]
 pub struct Neighbourhood {
     /// In the whole cloud.
-    pub(crate) in_cloud: Vec<i64>,
-    /// Among the tokens.
-    pub(crate) in_tokens: Vec<i64>,
+    pub(crate) in_cloud: RowNumbers,
+    /// Among the tokens; none where every point is one, and these are those in the cloud.
+    pub(crate) in_tokens: Option<RowNumbers>,
 }
 
 /// The layout of the skeleton extraction module, a level after the other.
@@ -60,12 +62,27 @@ pub(crate) struct LevelLayout {
 impl Neighbourhood {
     /// The `k` nearest neighbours of `tokens` in `cloud` and among themselves.
     pub fn new(tokens: &HostClouds, cloud: &HostClouds, k: usize) -> Self {
-        let of = |support: &HostClouds| {
-            let supports: Vec<_> = support.iter().collect();
-            flat_indices(tokens, support.per_cloud(), |i, tokens| k_nearest(tokens, supports[i], k))
-        };
-        Self { in_cloud: of(cloud), in_tokens: of(tokens) }
+        Self { in_tokens: Some(nearest_rows(tokens, tokens, k)), in_cloud: nearest_rows(tokens, cloud, k) }
     }
+
+    /// Where every point of `cloud` is a token.
+    pub fn within(cloud: &HostClouds, k: usize) -> Self {
+        Self { in_cloud: nearest_rows(cloud, cloud, k), in_tokens: None }
+    }
+
+    /// See [`RowNumbers::send`].
+    fn send(&mut self, device: &Device) {
+        self.in_cloud.send(device);
+        if let Some(rows) = &mut self.in_tokens {
+            rows.send(device);
+        }
+    }
+}
+
+/// Rows of the `k` points of each of `support` that are nearest to each of `clouds`.
+fn nearest_rows(clouds: &HostClouds, support: &HostClouds, k: usize) -> RowNumbers {
+    let supports: Vec<_> = support.iter().collect();
+    RowNumbers::new(flat_indices(clouds, support.per_cloud(), |i, cloud| k_nearest(cloud, supports[i], k)))
 }
 
 impl BranchLayout {
@@ -76,9 +93,17 @@ impl BranchLayout {
         let per_cloud = if chosen.is_some() { tokens } else { clouds.per_cloud() };
         let neighbours = match &chosen {
             Some(chosen) => Neighbourhood::new(&clouds.select(chosen, per_cloud), clouds, neighbours),
-            None => Neighbourhood::new(clouds, clouds, neighbours),
+            None => Neighbourhood::within(clouds, neighbours),
         };
-        Self { tokens: chosen, per_cloud, neighbours }
+        Self { tokens: chosen.map(RowNumbers::new), per_cloud, neighbours }
+    }
+
+    /// Sends the row numbers to the device that will run the branch, ahead of it; see [`RowNumbers::send`].
+    pub fn send(&mut self, device: &Device) {
+        if let Some(tokens) = &mut self.tokens {
+            tokens.send(device);
+        }
+        self.neighbours.send(device);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The registration loss.
 
 use burn::tensor::activation::softmax;
-use burn::tensor::{Tensor, TensorData};
+use burn::tensor::Tensor;
 
 use crate::procrustes::transform;
 use crate::sem::distance;
@@ -18,10 +18,8 @@ pub fn registration_loss(
     true_rotation: Tensor<3>,
     true_translation: Tensor<2>,
 ) -> Tensor<1> {
-    let identity: Vec<f64> = (0..9).map(|i| if i % 4 == 0 { 1.0 } else { 0.0 }).collect();
     let device = true_rotation.device().without_autodiff();
-    let identity =
-        Tensor::<3>::from_data(TensorData::new(identity, [1, 3, 3]), (&device, true_rotation.dtype()));
+    let identity = Tensor::<2>::eye(3, &device).cast(true_rotation.dtype()).unsqueeze::<3>();
     let difference = rotation.transpose().matmul(true_rotation) - identity;
     difference.square().mean() + (translation - true_translation).square().mean()
 }

@@ -44,8 +44,9 @@ pub fn nearest_rotation(matrices: Tensor<3>) -> Tensor<3> {
         }
     }
     let dtype = matrices.dtype();
-    let [r0, ad, dat, b, k] =
-        parts.map(|p| Tensor::<3>::from_data(TensorData::new(p, [batch, 3, 3]), (&device, dtype)));
+    // In one copy: each would stop a GPU.
+    let parts = Tensor::<3>::from_data(TensorData::new(parts.concat(), [5 * batch, 3, 3]), (&device, dtype));
+    let [r0, ad, dat, b, k] = std::array::from_fn(|i| parts.clone().narrow(0, i * batch, batch));
 
     let change = matrices.clone() - matrices.detach(); // zero, with the derivative of M
     let n = dat.matmul(change).matmul(b.clone());

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::attention::EncoderLayer;
 use crate::fast::{Activation, linear};
-use crate::geometry::{HostClouds, row_numbers, rows_at};
+use crate::geometry::{HostClouds, rows_at};
 use crate::layout::Neighbourhood;
 
 /// Sizes of the structural feature extractor.
@@ -90,8 +90,8 @@ impl Sfe {
         let [clouds, points, _] = cloud.dims();
         let k = self.neighbours;
         let mut table = cloud.reshape([clouds * points, 3]);
-        let in_tokens = row_numbers(&neighbours.in_tokens, &table);
-        let mut indices = row_numbers(&neighbours.in_cloud, &table);
+        let mut indices = neighbours.in_cloud.on(&table.device());
+        let in_tokens = neighbours.in_tokens.as_ref().map_or_else(|| indices.clone(), |rows| rows.on(&table.device()));
         let mut outputs = Vec::with_capacity(self.layers.len());
         for layer in &self.layers {
             let [_, channels] = table.dims();

@@ -9,7 +9,7 @@ use crate::branch::{Branch, BranchConfig, BranchOutput};
 use crate::geometry::HostClouds;
 use crate::inference::InferenceConfig;
 use crate::integration::{Fusion, IntegrationConfig};
-use crate::layout::SrrfLayout;
+use crate::layout::{BranchLayout, SrrfLayout};
 use crate::prior::PositionPrior;
 use crate::sem::{Sem, SemConfig, Skeleton};
 use crate::timing::timed;
@@ -160,10 +160,27 @@ impl Srrf {
         let stopped = skeletons.detached_points();
         let on_skeletons =
             stage("skeleton layout", || self.skeleton.layout(&HostClouds::read(&stopped), layout.phase));
+        let (skeleton, dense) = self.poses(stopped, &on_skeletons, clouds, layout);
+        (skeletons.halves(), skeleton, dense)
+    }
+
+    /// The registration, of clouds whose skeletons are known: what the skeleton branch found, and what the dense
+    /// branch found.
+    ///
+    /// # Shapes
+    /// - `skeletons`: `[2 batch, skeleton_points, 3]`, `clouds`: `[2 batch, points, 3]`, sources and then targets
+    pub fn poses(
+        &self,
+        skeletons: Tensor<3>,
+        on_skeletons: &BranchLayout,
+        clouds: Tensor<3>,
+        layout: &SrrfLayout,
+    ) -> (BranchOutput, BranchOutput) {
         // (2, 3) Features, interaction, matching and SVD: {R_s, t_s} and {R_c, t_c}.
         let prior = layout.prior.as_ref();
-        let skeleton = stage("skeleton branch", || self.skeleton.forward_with(stopped, &on_skeletons, prior));
+        let skeleton =
+            stage("skeleton branch", || self.skeleton.forward_with(skeletons, on_skeletons, prior));
         let dense = stage("dense branch", || self.dense.forward_with(clouds, &layout.dense, prior));
-        (skeletons.halves(), skeleton, dense)
+        (skeleton, dense)
     }
 }

@@ -13,7 +13,7 @@ pub mod resources;
 pub mod rows;
 pub mod run;
 pub mod schedule;
-mod srrf;
+pub mod srrf;
 mod start;
 pub mod step;
 pub mod validate;

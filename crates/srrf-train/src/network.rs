@@ -26,6 +26,13 @@ pub struct Shard {
     pub phase: f32,
 }
 
+impl Shard {
+    /// Sources and then targets, `[2 batch, points, 3]`.
+    pub fn clouds(&self) -> Tensor<3> {
+        Tensor::cat(vec![self.batch.source.clone(), self.batch.target.clone()], 0)
+    }
+}
+
 /// What a network found on the pairs of a shard, for validation.
 pub struct Found {
     /// A list of poses for each of [`Trained::ROWS`].
@@ -60,6 +67,18 @@ pub trait Trained: NetworkConfig {
 
     /// The layout of a shard: its clouds, sources and then targets.
     fn layout(&self, stage: &StageConfig, clouds: &HostClouds, phase: f32) -> Self::Layout;
+
+    /// What the device can do of a shard ahead of its step, on other threads: what depends on those parts of
+    /// `network` alone that none of the `stages` of the run trains. Only called where a device computes beside the host.
+    fn ahead(
+        &self,
+        _stages: &[StageConfig],
+        _network: &Self::Network,
+        _shard: &Shard,
+        layout: Self::Layout,
+    ) -> Self::Layout {
+        layout
+    }
 
     /// Gradients and losses of one shard, on a graph of its own.
     fn gradient(

@@ -25,7 +25,7 @@ use crate::resources::cpu_seconds;
 use crate::rows::Updater;
 use crate::schedule::Plan;
 use crate::start::starting_model;
-use crate::step::{AheadOf, Losses, StepContext, StepError, Workers, gradient, prepare};
+use crate::step::{AheadOf, Losses, StepContext, StepError, Workers, device_of, gradient, prepare};
 use crate::validate::{CHUNK, ValidateError, Validation, validate};
 
 /// Steps between two lines of the log.
@@ -186,14 +186,17 @@ pub fn run<C: Trained>(
     // The device computes elsewhere: all threads make pairs ahead of it.
     let shards = config.optimizer.shards();
     let ahead = Ahead::new(run.progress.step * shards, shards + 2 * options.threads);
-    let (pairs, plan) = (run.pairs.clone(), run.plan.clone());
+    let (pairs, plan, devices) = (run.pairs.clone(), run.plan.clone(), run.devices.clone());
+    let networks: Vec<C::Network> = devices.iter().map(|device| run.model.clone().to_device(device)).collect();
     std::thread::scope(|scope| {
         let _closing = Closing(&ahead);
         for _ in 0..options.threads {
             scope.spawn(|| {
                 ahead.work(|number| {
                     let stage = &config.stages[plan.stage(number / shards)];
-                    prepare(config, stage, &pairs, number)
+                    let d = device_of(number % shards, &devices);
+                    let prepared = prepare(config, stage, &pairs, number, &devices[d])?;
+                    Ok(prepared.ahead(config, &networks[d]))
                 });
             });
         }

@@ -7,7 +7,7 @@ use srrf_cloud::Rigid;
 use srrf_model::geometry::HostClouds;
 use srrf_model::weights::WeightsError;
 use srrf_model::{
-    BranchOutput, SemLayout, Skeleton, Srrf, SrrfConfig, SrrfLayout, chamfer, correspondence_loss, embedded,
+    BranchLayout, BranchOutput, SemLayout, Skeleton, Srrf, SrrfConfig, SrrfLayout, chamfer, correspondence_loss, embedded,
     matching_loss, registration_loss, skeleton_loss, spread, transform,
 };
 
@@ -40,6 +40,19 @@ impl Trained for SrrfConfig {
         }
     }
 
+    fn ahead(&self, stages: &[StageConfig], network: &Srrf, shard: &Shard, layout: Layout) -> Layout {
+        let Layout::Whole(mut layout) = layout else { return layout };
+        let device = shard.batch.source.device();
+        layout.dense.send(&device);
+        if stages.iter().any(|stage| stage.sem != SemTraining::Frozen) {
+            return Layout::Whole(layout);
+        }
+        let skeletons = network.sem.forward_with(shard.clouds(), &layout.sem).detached_points();
+        let mut on_skeletons = network.skeleton.layout(&HostClouds::read(&skeletons), layout.phase);
+        on_skeletons.send(&device);
+        Layout::Registration { layout, skeletons, on_skeletons }
+    }
+
     fn gradient(
         &self,
         losses: &LossConfig,
@@ -55,32 +68,31 @@ impl Trained for SrrfConfig {
         fork.dense = if stage.registration { fork.dense.train() } else { fork.dense.valid() };
         fork.skeleton = if stage.registration { fork.skeleton.train() } else { fork.skeleton.valid() };
 
+        let clouds = shard.clouds();
         let Shard { batch, rotation, translation, .. } = shard;
         let (source, target) = (batch.source, batch.target);
         let mut terms = Terms::default();
-        let (source_skeleton, target_skeleton) = match layout {
+        let (skeletons, branches) = match layout {
             Layout::Whole(layout) => {
                 let (skeletons, skeleton, dense) = fork.branches(source.clone(), target.clone(), &layout);
-                for (names, branch) in [(DENSE, &dense), (SKELETON, &skeleton)] {
-                    branch_terms(&mut terms, names, branch, losses, &rotation, &translation);
-                }
-                if losses.fused > 0.0 {
-                    let fused = self.integration.fuse(dense.pose(), skeleton.pose(), &source, &target);
-                    let (r, t) = (rotation.clone(), translation.clone());
-                    terms.add(
-                        "fused",
-                        registration_loss(fused.rotation, fused.translation, r, t),
-                        losses.fused,
-                    );
-                }
-                skeletons
+                (Some(skeletons), Some((skeleton, dense)))
             }
-            Layout::Skeletons(layout) => {
-                let clouds = Tensor::cat(vec![source.clone(), target.clone()], 0);
-                fork.sem.forward_with(clouds, &layout).halves()
+            Layout::Registration { layout, skeletons, on_skeletons } => {
+                (None, Some(fork.poses(skeletons, &on_skeletons, clouds, &layout)))
             }
+            Layout::Skeletons(layout) => (Some(fork.sem.forward_with(clouds, &layout).halves()), None),
         };
-        if trains_sem {
+        if let Some((skeleton, dense)) = branches {
+            for (names, branch) in [(DENSE, &dense), (SKELETON, &skeleton)] {
+                branch_terms(&mut terms, names, branch, losses, &rotation, &translation);
+            }
+            if losses.fused > 0.0 {
+                let fused = self.integration.fuse(dense.pose(), skeleton.pose(), &source, &target);
+                let (r, t) = (rotation.clone(), translation.clone());
+                terms.add("fused", registration_loss(fused.rotation, fused.translation, r, t), losses.fused);
+            }
+        }
+        if let Some((source_skeleton, target_skeleton)) = skeletons.filter(|_| trains_sem) {
             let (x, y) = ((source, &source_skeleton), (target, &target_skeleton));
             skeleton_terms(&mut terms, stage.sem, losses, x, y, rotation, translation);
         }
@@ -112,6 +124,15 @@ impl Trained for SrrfConfig {
 pub enum Layout {
     /// Stages that train the registration.
     Whole(SrrfLayout),
+    /// Stages that train the registration alone, where the frozen skeletons were found ahead.
+    Registration {
+        /// Of the clouds.
+        layout: SrrfLayout,
+        /// `[2 batch, skeleton_points, 3]`.
+        skeletons: Tensor<3>,
+        /// Of the skeletons.
+        on_skeletons: BranchLayout,
+    },
     /// Stages that train the skeleton module alone.
     Skeletons(SemLayout),
 }

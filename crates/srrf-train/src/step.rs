@@ -40,12 +40,12 @@ pub struct StepContext<'a, C: Trained = SrrfConfig> {
 /// Shards made ahead of their steps.
 pub type AheadOf<C> = Ahead<Result<Prepared<<C as Trained>::Layout>, StepError>>;
 
-/// A shard that is not on a device yet.
+/// A shard on its device, and its layout.
 pub struct Prepared<L> {
-    pairs: HostPairs,
-    poses: Vec<Rigid>,
-    phase: f32,
-    layout: L,
+    /// The pairs.
+    pub shard: Shard,
+    /// What the network has to know of their clouds.
+    pub layout: L,
 }
 
 /// Makes shard number `number` of a run: pairs, frames, layout.
@@ -57,6 +57,7 @@ pub fn prepare<C: Trained>(
     stage: &StageConfig,
     pairs: &TrainingPairs,
     number: usize,
+    device: &Device,
 ) -> Result<Prepared<C::Layout>, StepError> {
     let count = config.optimizer.shard;
     let first = number * count;
@@ -64,7 +65,16 @@ pub fn prepare<C: Trained>(
     let phase = ChaCha8Rng::seed_from_u64(first as u64).random::<f32>();
     let (pairs, poses) = host_pairs(&pairs).ok_or(StepError::Ragged(first))?;
     let layout = profile::stage("layout", || config.network.layout(stage, &pairs.clouds, phase));
-    Ok(Prepared { pairs, poses, phase, layout })
+    Ok(Prepared { shard: upload(&pairs, &poses, phase, device), layout })
+}
+
+impl<L> Prepared<L> {
+    /// With what the device can do ahead of the step; see [`Trained::ahead`].
+    pub fn ahead<C: Trained<Layout = L>>(self, config: &TrainConfig<C>, network: &C::Network) -> Self {
+        let Self { shard, layout } = self;
+        let layout = config.network.ahead(&config.stages, network, &shard, layout);
+        Self { shard, layout }
+    }
 }
 
 /// What a step found.
@@ -154,7 +164,7 @@ pub fn gradient<C: Trained>(
     let shards = context.config.optimizer.shards();
     let (first, others) = context.devices.split_first().ok_or(StepError::NoDevice)?;
     let copies: Vec<C::Network> = others.iter().map(|device| model.clone().to_device(device)).collect();
-    let run = |i: usize| match i % context.devices.len() {
+    let run = |i: usize| match device_of(i, context.devices) {
         0 => shard(context, model, first, step * shards + i),
         d => shard(context, &copies[d - 1], &others[d - 1], step * shards + i),
     };
@@ -173,6 +183,11 @@ pub fn gradient<C: Trained>(
     let gradients = RowGradients::mean(rows);
     let norm = gradients.norm();
     Ok(StepOutcome { gradients, norm, losses })
+}
+
+/// Which of the devices takes shard `i` of a batch.
+pub fn device_of(i: usize, devices: &[Device]) -> usize {
+    i % devices.len()
 }
 
 /// `pairs` as a shard on `device`.
@@ -203,10 +218,9 @@ fn shard<C: Trained>(
     let StepContext { config, stage, pairs, ahead, .. } = *context;
     let prepared = match ahead {
         Some(ahead) => ahead.take(number).ok_or(StepError::Worker)?,
-        None => prepare(config, stage, pairs, number),
+        None => prepare(config, stage, pairs, number, device),
     };
-    let Prepared { pairs, poses, phase, layout } = prepared?;
-    let shard = upload(&pairs, &poses, phase, device);
+    let Prepared { shard, layout } = prepared?;
     let (gradients, losses) =
         profile::stage("network", || config.network.gradient(&config.losses, stage, network, shard, layout));
     Ok((RowGradients::new(gradients, network), losses))
