@@ -5,7 +5,7 @@
 #   scripts/train-gpu.sh --prepare --data PATH     builds the program and packs the data, for another machine
 #
 # FOLDER holds all that the machine with the GPU needs beside this checkout: the program `srrf-train`, the
-# training shapes packed below 50 MB (`data/`), and the run (`run/`). What is there already is used, so that
+# training shapes packed below 50 MB (`data/`), and the runs (`runs/CONFIG/`). What is there already is used, so that
 # machine needs neither cargo, Python nor network: the program finds the CUDA driver at run time.
 # Building needs the network once (Burn's CUDA backend fetches its own LLVM), packing needs python3.
 # For a rehearsal without a GPU: --device flex --config configs/smoke.toml.
@@ -99,7 +99,7 @@ if [ "$device" = cuda ] && ! ldconfig -p | grep -q 'libcuda\.so' && [ -z "${LD_L
   echo "train-gpu: no libcuda.so; install NVIDIA's driver, or name its folder in LD_LIBRARY_PATH" >&2
 fi
 for ((slice = 1; slice <= slices; slice++)); do
-  "$folder/srrf-train" --config "$config" "${needs_data[@]}" --run "$folder/run" --device "$device" \
+  "$folder/srrf-train" --config "$config" "${needs_data[@]}" --run "$folder/runs/$(basename "$config" .toml)" --device "$device" \
     --minutes "$minutes" --resume 2>&1 | tee "$folder/slice.log"
   grep -q '^not complete' "$folder/slice.log" || { echo "complete after $slice slices"; exit; }
 done

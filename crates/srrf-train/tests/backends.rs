@@ -6,10 +6,10 @@
 //! `$SRRF_REQUIRE_DEVICE` names it.
 //!
 //! Tolerances, in shares of the largest number compared. Sums in another order differ by some 1e-6 in `f32`;
-//! ten layers, a softmax and the 3 x 3 SVD make up to 1e-5 of it in the output ([`FORWARD`]), and the way
-//! back doubles the depth ([`GRADIENT`]). Adam divides by the gradient's own size, so that parameters whose
+//! ten layers, a softmax and the 3 x 3 SVD make up to 1e-5 of it in the output, and the way
+//! back doubles the depth ([`F32`]). Adam divides by the gradient's own size, so that parameters whose
 //! gradient is rounding alone move by whole steps in a direction of their own: five steps are compared
-//! by their losses ([`LOSSES`]) and by the norm of what all parameters moved together ([`MOVED`]).
+//! by their losses and by the norm of what all parameters moved together.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "a test says what it skips")]
 
 use std::collections::BTreeMap;
@@ -29,15 +29,28 @@ use srrf_train::rows::Updater;
 use srrf_train::srrf::Layout;
 use srrf_train::step::{Prepared, StepContext, Workers, gradient, prepare, to_shard};
 
-const FORWARD: f64 = 1e-4;
-const GRADIENT: f64 = 1e-3;
-const LOSSES: f64 = 1e-3;
-const MOVED: f64 = 1e-2;
+/// How far apart two devices may be.
+struct Tolerances {
+    forward: f64,
+    gradient: f64,
+    losses: f64,
+    moved: f64,
+}
 
-/// That of the forward pass on `cuda`: CubeCL's kernels for tensor cores round `f32` factors to TF32, whose unit
-/// roundoff is `2^-11`, or 4.9e-4, where that of `f32` is 6.0e-8, and Burn has no switch for it. The others have
-/// not been measured there, and stand as they are.
-const FORWARD_TF32: f64 = 2e-3;
+const F32: Tolerances = Tolerances { forward: 1e-4, gradient: 1e-3, losses: 1e-3, moved: 1e-2 };
+
+/// Those on `cuda`: CubeCL's kernels for tensor cores round `f32` factors to TF32, whose unit roundoff is `2^-11`, or 4.9e-4,
+/// where that of `f32` is 6.0e-8, and Burn has no switch for it. In `f32` the output is 100 roundoffs from `f64` and the gradient
+/// 1,500, so that TF32 could leave them 0.05 and 0.7 apart. On an H100 they came out 5.5e-3 and 6.7e-2 apart, the losses
+/// 4.1e-2 and the parameters 5.1e-2; each may be two to four times that. A wrong gradient is apart by 1.
+const TF32: Tolerances = Tolerances { forward: 2e-2, gradient: 0.2, losses: 0.1, moved: 0.2 };
+
+impl Tolerances {
+    /// Those of a device, or of a few by turns, the first of which is named first.
+    fn of(name: &str) -> &'static Self {
+        if name.starts_with("cuda") { &TF32 } else { &F32 }
+    }
+}
 
 const PAIRS: usize = 3;
 const STEPS: usize = 5;
@@ -206,12 +219,12 @@ fn agrees(name: &str, device: &Device, dtype: DType) -> Vec<Measured> {
     let (wanted, wanted_gradients) = pass(&Device::flex(), DType::F32);
     assert!(wanted.len() == 10 && wanted_gradients.len() > 50, "something to compare");
     let (found, gradients) = pass(device, dtype);
-    let tolerance = if name == "cuda" { FORWARD_TF32 } else { FORWARD };
+    let tolerances = Tolerances::of(name);
     let (forward, of) = compare(name, (&found, &wanted), 0.0);
-    let forward = Measured { what: format!("{name}, forward, {of}"), apart: forward, allowed: tolerance };
+    let forward = Measured { what: format!("{name}, forward, {of}"), apart: forward, allowed: tolerances.forward };
     // Some gradients are 0 by construction and come out as what rounding leaves.
     let (backward, of) = compare(name, (&gradients, &wanted_gradients), 1e-2);
-    let backward = Measured { what: format!("{name}, gradient of {of}"), apart: backward, allowed: GRADIENT };
+    let backward = Measured { what: format!("{name}, gradient of {of}"), apart: backward, allowed: tolerances.gradient };
     vec![forward, backward]
 }
 
@@ -223,9 +236,10 @@ fn trains(name: &str, devices: &[Device]) -> Vec<Measured> {
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let difference: Vec<f64> = moved.iter().zip(&wanted_moved).map(|(a, b)| a - b).collect();
     let moved = norm(&difference) / norm(&wanted_moved);
+    let Tolerances { losses: of_losses, moved: of_moved, .. } = Tolerances::of(name);
     vec![
-        Measured { what: format!("{name}, losses of {STEPS} steps"), apart: losses, allowed: LOSSES },
-        Measured { what: format!("{name}, parameters after them"), apart: moved, allowed: MOVED },
+        Measured { what: format!("{name}, losses of {STEPS} steps"), apart: losses, allowed: of_losses },
+        Measured { what: format!("{name}, parameters after them"), apart: moved, allowed: of_moved },
     ]
 }
 
