@@ -350,11 +350,6 @@ impl RowNumbers {
         Self { host, sent: None }
     }
 
-    /// The numbers.
-    pub fn host(&self) -> &[i64] {
-        &self.host
-    }
-
     /// Sends them to `device`.
     pub fn send(&mut self, device: &Device) {
         self.sent = Some(on_device(&self.host, device));

@@ -1,7 +1,7 @@
 //! The registration loss.
 
-use burn::tensor::activation::softmax;
 use burn::tensor::Tensor;
+use burn::tensor::activation::softmax;
 
 use crate::procrustes::transform;
 use crate::sem::distance;

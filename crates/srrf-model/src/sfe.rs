@@ -91,7 +91,8 @@ impl Sfe {
         let k = self.neighbours;
         let mut table = cloud.reshape([clouds * points, 3]);
         let mut indices = neighbours.in_cloud.on(&table.device());
-        let in_tokens = neighbours.in_tokens.as_ref().map_or_else(|| indices.clone(), |rows| rows.on(&table.device()));
+        let in_tokens =
+            neighbours.in_tokens.as_ref().map_or_else(|| indices.clone(), |rows| rows.on(&table.device()));
         let mut outputs = Vec::with_capacity(self.layers.len());
         for layer in &self.layers {
             let [_, channels] = table.dims();

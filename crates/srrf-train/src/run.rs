@@ -187,7 +187,8 @@ pub fn run<C: Trained>(
     let shards = config.optimizer.shards();
     let ahead = Ahead::new(run.progress.step * shards, shards + 2 * options.threads);
     let (pairs, plan, devices) = (run.pairs.clone(), run.plan.clone(), run.devices.clone());
-    let networks: Vec<C::Network> = devices.iter().map(|device| run.model.clone().to_device(device)).collect();
+    let networks: Vec<C::Network> =
+        devices.iter().map(|device| run.model.clone().to_device(device)).collect();
     std::thread::scope(|scope| {
         let _closing = Closing(&ahead);
         for _ in 0..options.threads {

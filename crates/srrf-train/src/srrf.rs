@@ -7,8 +7,8 @@ use srrf_cloud::Rigid;
 use srrf_model::geometry::HostClouds;
 use srrf_model::weights::WeightsError;
 use srrf_model::{
-    BranchLayout, BranchOutput, SemLayout, Skeleton, Srrf, SrrfConfig, SrrfLayout, chamfer, correspondence_loss, embedded,
-    matching_loss, registration_loss, skeleton_loss, spread, transform,
+    BranchLayout, BranchOutput, SemLayout, Skeleton, Srrf, SrrfConfig, SrrfLayout, chamfer,
+    correspondence_loss, embedded, matching_loss, registration_loss, skeleton_loss, spread, transform,
 };
 
 use crate::config::{LossConfig, SemTraining, StageConfig};

@@ -221,10 +221,12 @@ fn agrees(name: &str, device: &Device, dtype: DType) -> Vec<Measured> {
     let (found, gradients) = pass(device, dtype);
     let tolerances = Tolerances::of(name);
     let (forward, of) = compare(name, (&found, &wanted), 0.0);
-    let forward = Measured { what: format!("{name}, forward, {of}"), apart: forward, allowed: tolerances.forward };
+    let forward =
+        Measured { what: format!("{name}, forward, {of}"), apart: forward, allowed: tolerances.forward };
     // Some gradients are 0 by construction and come out as what rounding leaves.
     let (backward, of) = compare(name, (&gradients, &wanted_gradients), 1e-2);
-    let backward = Measured { what: format!("{name}, gradient of {of}"), apart: backward, allowed: tolerances.gradient };
+    let backward =
+        Measured { what: format!("{name}, gradient of {of}"), apart: backward, allowed: tolerances.gradient };
     vec![forward, backward]
 }
 
@@ -236,7 +238,7 @@ fn trains(name: &str, devices: &[Device]) -> Vec<Measured> {
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let difference: Vec<f64> = moved.iter().zip(&wanted_moved).map(|(a, b)| a - b).collect();
     let moved = norm(&difference) / norm(&wanted_moved);
-    let Tolerances { losses: of_losses, moved: of_moved, .. } = Tolerances::of(name);
+    let &Tolerances { losses: of_losses, moved: of_moved, .. } = Tolerances::of(name);
     vec![
         Measured { what: format!("{name}, losses of {STEPS} steps"), apart: losses, allowed: of_losses },
         Measured { what: format!("{name}, parameters after them"), apart: moved, allowed: of_moved },
