@@ -35,7 +35,7 @@ impl Trained for SrrfConfig {
 
     fn layout(&self, stage: &StageConfig, clouds: &HostClouds, phase: f32) -> Layout {
         match stage.registration {
-            true => Layout::Whole(SrrfConfig::layout(self, clouds, phase)),
+            true => Layout::Whole(Box::new(SrrfConfig::layout(self, clouds, phase))),
             false => Layout::Skeletons(self.sem.layout(clouds)),
         }
     }
@@ -50,7 +50,7 @@ impl Trained for SrrfConfig {
         let skeletons = network.sem.forward_with(shard.clouds(), &layout.sem).detached_points();
         let mut on_skeletons = network.skeleton.layout(&HostClouds::read(&skeletons), layout.phase);
         on_skeletons.send(&device);
-        Layout::Registration { layout, skeletons, on_skeletons }
+        Layout::Registration(Box::new(FrozenSkeletons { layout, skeletons, on_skeletons }))
     }
 
     fn gradient(
@@ -77,7 +77,8 @@ impl Trained for SrrfConfig {
                 let (skeletons, skeleton, dense) = fork.branches(source.clone(), target.clone(), &layout);
                 (Some(skeletons), Some((skeleton, dense)))
             }
-            Layout::Registration { layout, skeletons, on_skeletons } => {
+            Layout::Registration(known) => {
+                let FrozenSkeletons { layout, skeletons, on_skeletons } = *known;
                 (None, Some(fork.poses(skeletons, &on_skeletons, clouds, &layout)))
             }
             Layout::Skeletons(layout) => (Some(fork.sem.forward_with(clouds, &layout).halves()), None),
@@ -123,18 +124,22 @@ impl Trained for SrrfConfig {
 #[derive(Debug)]
 pub enum Layout {
     /// Stages that train the registration.
-    Whole(SrrfLayout),
+    Whole(Box<SrrfLayout>),
     /// Stages that train the registration alone, where the frozen skeletons were found ahead.
-    Registration {
-        /// Of the clouds.
-        layout: SrrfLayout,
-        /// `[2 batch, skeleton_points, 3]`.
-        skeletons: Tensor<3>,
-        /// Of the skeletons.
-        on_skeletons: BranchLayout,
-    },
+    Registration(Box<FrozenSkeletons>),
     /// Stages that train the skeleton module alone.
     Skeletons(SemLayout),
+}
+
+/// Skeletons that no stage changes.
+#[derive(Debug)]
+pub struct FrozenSkeletons {
+    /// Of the clouds.
+    layout: Box<SrrfLayout>,
+    /// `[2 batch, skeleton_points, 3]`.
+    skeletons: Tensor<3>,
+    /// Of the skeletons.
+    on_skeletons: BranchLayout,
 }
 
 const DENSE: [&str; 3] = ["dense", "dense_correspondence", "dense_matching"];

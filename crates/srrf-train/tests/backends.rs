@@ -289,7 +289,7 @@ fn what_is_done_ahead_of_a_step_changes_nothing() {
     let gradients = |ahead: bool| {
         let prepared = prepare(&config, stage, &pairs, 1, &device).unwrap();
         let Prepared { shard, layout } = if ahead { prepared.ahead(&config, &model) } else { prepared };
-        assert_eq!(matches!(layout, Layout::Registration { .. }), ahead);
+        assert_eq!(matches!(layout, Layout::Registration(_)), ahead);
         let (all, losses) = config.network.gradient(&config.losses, stage, &model, shard, layout);
         let mut gradients = Gradients { all, path: Vec::new(), found: Numbers::new() };
         model.visit(&mut gradients);
