@@ -29,14 +29,14 @@ const CURVES: [&str; 12] = [
     "icp",
     "srrf",
     "srrf+refine",
+    "rgm",
     "dcp",
     "fpfh-ransac",
+    "panet",
     "equi-gspr",
+    "pointnetlk",
     "srrf-dense",
     "srrf-skeleton",
-    "panet",
-    "rgm",
-    "pointnetlk",
 ];
 
 /// Error against severity, one picture for each principal quantity.
