@@ -68,21 +68,23 @@ impl Trained for SrrfConfig {
         fork.dense = if stage.registration { fork.dense.train() } else { fork.dense.valid() };
         fork.skeleton = if stage.registration { fork.skeleton.train() } else { fork.skeleton.valid() };
 
-        let clouds = shard.clouds();
-        let Shard { batch, rotation, translation, .. } = shard;
-        let (source, target) = (batch.source, batch.target);
-        let mut terms = Terms::default();
         let (skeletons, branches) = match layout {
             Layout::Whole(layout) => {
-                let (skeletons, skeleton, dense) = fork.branches(source.clone(), target.clone(), &layout);
+                let (source, target) = (shard.batch.source.clone(), shard.batch.target.clone());
+                let (skeletons, skeleton, dense) = fork.branches(source, target, &layout);
                 (Some(skeletons), Some((skeleton, dense)))
             }
             Layout::Registration(known) => {
                 let FrozenSkeletons { layout, skeletons, on_skeletons } = *known;
-                (None, Some(fork.poses(skeletons, &on_skeletons, clouds, &layout)))
+                (None, Some(fork.poses(skeletons, &on_skeletons, shard.clouds(), &layout)))
             }
-            Layout::Skeletons(layout) => (Some(fork.sem.forward_with(clouds, &layout).halves()), None),
+            Layout::Skeletons(layout) => {
+                (Some(fork.sem.forward_with(shard.clouds(), &layout).halves()), None)
+            }
         };
+        let Shard { batch, rotation, translation, .. } = shard;
+        let (source, target) = (batch.source, batch.target);
+        let mut terms = Terms::default();
         if let Some((skeleton, dense)) = branches {
             for (names, branch) in [(DENSE, &dense), (SKELETON, &skeleton)] {
                 branch_terms(&mut terms, names, branch, losses, &rotation, &translation);

@@ -48,7 +48,7 @@ pub struct Prepared<L> {
     pub layout: L,
 }
 
-/// Makes shard number `number` of a run: pairs, frames, layout.
+/// Makes shard number `number` of a run: pairs and frames, on `device`, and their layout.
 ///
 /// # Errors
 /// [`StepError`] when a pair cannot be made.

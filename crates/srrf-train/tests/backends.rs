@@ -192,9 +192,11 @@ fn apart(ours: &[f64], wanted: &[f64]) -> f64 {
 fn compare(what: &str, (ours, wanted): (&Numbers, &Numbers), least: f64) -> (f64, String) {
     assert!(ours.keys().eq(wanted.keys()), "{what}: other names");
     let most = wanted.values().map(|numbers| largest(numbers)).fold(0.0, f64::max);
-    let share = |name: &String, wanted| apart(&ours[name], wanted) / largest(wanted).max(least * most);
+    // Without its sign, so that what is not a number comes out as the largest.
+    let share =
+        |name: &String, wanted| (apart(&ours[name], wanted) / largest(wanted).max(least * most)).abs();
     let shares = wanted.iter().map(|(name, wanted)| (share(name, wanted), name.clone()));
-    shares.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap() // NaN is the largest
+    shares.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap()
 }
 
 /// What was compared, how far it is apart, and how far it may be.
