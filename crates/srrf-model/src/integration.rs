@@ -5,6 +5,7 @@ use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::defaults;
 use crate::geometry::{HostClouds, share_within};
 use crate::procrustes::{nearest_rotation, transform};
 
@@ -38,16 +39,8 @@ pub struct IntegrationConfig {
     pub sharpness: f64,
     /// The `w` above. Below 1 the skeleton branch wins only where its pose has that much more inliers: of two poses that
     /// fit about as well, the dense branch's is the better one more often. Default and the paper: 1.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
+    #[serde(default = "defaults::one", skip_serializing_if = "defaults::is_one")]
     pub skeleton_weight: f64,
-}
-
-fn one() -> f64 {
-    1.0
-}
-
-fn is_one(value: &f64) -> bool {
-    *value == 1.0
 }
 
 /// The fused pose and what it was made from.

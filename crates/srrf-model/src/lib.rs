@@ -11,6 +11,7 @@ pub mod attention;
 mod batch;
 mod branch;
 mod confidence;
+pub mod defaults;
 mod device;
 pub mod embedded;
 pub mod fast;

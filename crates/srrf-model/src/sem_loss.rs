@@ -4,6 +4,7 @@
 use burn::tensor::{Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
+use crate::defaults;
 use crate::geometry::rows;
 use crate::procrustes::transform;
 use crate::sem::{Skeleton, distance, nearest_distance, nearest_rows};
@@ -21,16 +22,11 @@ pub struct SkeletonLossConfig {
     pub distribution: f64,
     /// The weight of the distribution distance over the spread of the target skeleton, which shrinking does not
     /// lower, so that it may be as large as the distance is to count. Not in the paper; 0 is the paper.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "defaults::is_zero")]
     pub distribution_over_spread: f64,
     /// The weight of the distance between skeleton points of the same number in both clouds, over
     /// their spread. Not in the paper; 0 is the paper.
     pub index_match: f64,
-}
-
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "the form that serde calls")]
-fn is_zero(weight: &f64) -> bool {
-    *weight == 0.0
 }
 
 /// The losses of one batch, each of shape `[1]`.

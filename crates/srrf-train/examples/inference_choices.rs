@@ -10,17 +10,16 @@ use std::path::PathBuf;
 use clap::{Parser, ValueEnum};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
-use srrf_cloud::source::{Split, open};
 use srrf_cloud::{PointCloud, Register, Registration, Rigid};
 use srrf_corrupt::crop::{crop, random_direction};
-use srrf_corrupt::{Pair, Severity};
-use srrf_eval::{PairError, Scores};
+use srrf_corrupt::{CorruptionKind, Pair, Severity};
+use srrf_eval::{MetricError, PairError, Scores};
 use srrf_model::{
-    BranchKind, InferenceConfig, InlierTest, IntegrationConfig, Matches, SrrfRegister, device, embedded,
-    keep_freed_memory,
+    BranchKind, InferenceConfig, InlierTest, IntegrationConfig, Matches, SrrfConfig, SrrfRegister, device,
+    embedded, keep_freed_memory,
 };
 use srrf_train::config::TrainConfig;
-use srrf_train::data::TrainingPairs;
+use srrf_train::data::{TrainingPairs, training_shapes};
 use srrf_train::step::Workers;
 
 /// Scores the ways to use trained weights on validation pairs.
@@ -30,8 +29,8 @@ struct Arguments {
     config: PathBuf,
     /// Name of a network in the program, or a file.
     weights: String,
-    /// Where ModelNet40 is.
-    data: PathBuf,
+    /// Where ModelNet40 is, if the configuration trains on it.
+    data: Option<PathBuf>,
     /// Severities of the pairs.
     #[arg(long, value_delimiter = ',', default_value = "3")]
     severities: Vec<u8>,
@@ -45,13 +44,18 @@ struct Arguments {
     /// from the fused pose.
     #[arg(long)]
     alone: bool,
+    /// Print the figures of each corruption under each row.
+    #[arg(long)]
+    by_corruption: bool,
 }
 
 /// Parts of the table.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Rows {
-    /// All of them; an hour and more.
+    /// All of the below; an hour and more.
     All,
+    /// As the weights' own header says.
+    Header,
     /// Soft matches in all passes.
     Mean,
     /// Most probable matches in the last pass.
@@ -166,14 +170,28 @@ impl Row {
         Self { tokens, inference, integration }
     }
 
-    fn all(wanted: Rows) -> Vec<Self> {
+    fn of_header(header: &SrrfConfig) -> Self {
+        Self {
+            tokens: header.dense.tokens,
+            inference: header.inference.clone(),
+            integration: header.integration.clone(),
+        }
+    }
+
+    fn all(wanted: Rows, header: &SrrfConfig) -> Vec<Self> {
         let of = |part: Rows| wanted == part || wanted == Rows::All;
         let mean = MEAN.iter().map(|&choice| Self::new(choice, Matches::Mean, None));
         let best = BEST.iter().map(|&choice| Self::new(choice, Matches::Best, None));
         let prior =
             PRIOR.iter().map(|&(deviation, choice)| Self::new(choice, Matches::Best, Some(deviation)));
         let mean = mean.filter(|_| of(Rows::Mean));
-        mean.chain(best.filter(|_| of(Rows::Best))).chain(prior.filter(|_| of(Rows::Prior))).collect()
+        let header = of(Rows::Header).then(|| Self::of_header(header));
+        header
+            .into_iter()
+            .chain(mean)
+            .chain(best.filter(|_| of(Rows::Best)))
+            .chain(prior.filter(|_| of(Rows::Prior)))
+            .collect()
     }
 
     fn describe(&self) -> String {
@@ -195,7 +213,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     keep_freed_memory();
     let arguments = Arguments::parse();
     let config = <TrainConfig>::read(&arguments.config)?;
-    let pairs = TrainingPairs::new(&config, open(&arguments.data, Split::Train)?)?;
+    let pairs = TrainingPairs::new(&config, training_shapes(&config, arguments.data.as_deref())?)?;
     let mut held_out: Vec<Pair> = Vec::new();
     for &severity in &arguments.severities {
         held_out.extend(pairs.validation(Severity::try_from(severity)?)?);
@@ -220,21 +238,31 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         columns.join(" | "),
         "---|".repeat(5 + columns.len())
     );
-    for row in Row::all(arguments.rows) {
-        let device = device("flex")?;
-        let mut loaded = embedded::open(&arguments.weights, &device)?;
+    let device = device("flex")?;
+    let opened = embedded::open(&arguments.weights, &device)?;
+    for row in Row::all(arguments.rows, &opened.config) {
+        let mut loaded = opened.clone();
         loaded.model.dense = loaded.model.dense.with_tokens(row.tokens);
         loaded.config.integration = row.integration.clone();
         loaded.config.inference = row.inference.clone();
         let network = || SrrfRegister::new(loaded.clone(), device.clone());
-        let scores = match arguments.alone {
+        let errors = match arguments.alone {
             true => {
-                let alone = |branch| score(&network().alone(branch), &held_out, &workers, own);
+                let alone = |branch| errors_of(&network().alone(branch), &held_out, &workers, own);
                 [alone(BranchKind::Dense)?, alone(BranchKind::Skeleton)?].concat()
             }
-            false => score(&network(), &held_out, &workers, of_both)?,
+            false => errors_of(&network(), &held_out, &workers, of_both)?,
         };
-        println!("| {} | {} |", row.describe(), scores.join(" | "));
+        println!("| {} | {} |", row.describe(), scores(&errors, |_| true)?);
+        if arguments.by_corruption {
+            for kind in std::iter::once(None).chain(CorruptionKind::ALL.map(Some)) {
+                let name = kind.map_or("clean", |kind: CorruptionKind| kind.name());
+                let of_kind = |i: usize| held_out[i].corruption.map(|(kind, _)| kind) == kind;
+                if (0..held_out.len()).any(of_kind) {
+                    println!("| {name} | | | | | {} |", scores(&errors, of_kind)?);
+                }
+            }
+        }
     }
     Ok(())
 }
@@ -265,30 +293,35 @@ fn of_both(answer: &Registration, truth: &Rigid) -> [Option<Rigid>; 4] {
     [branch(0), branch(1), Some(answer.target_from_source), branch(better)]
 }
 
-/// `RMSE / MAE / median` of each column.
-fn score<const N: usize>(
+/// The errors of all pairs, for each column.
+fn errors_of<const N: usize>(
     method: &SrrfRegister,
     pairs: &[Pair],
     workers: &Workers,
     columns: Columns<N>,
-) -> Result<Vec<String>, Box<dyn std::error::Error>> {
+) -> Result<Vec<Vec<PairError>>, Box<dyn std::error::Error>> {
     let answers = workers
         .map(pairs.len(), |i| {
             let answer = method.register(&pairs[i].source, &pairs[i].target).ok()?;
             Some(columns(&answer, &pairs[i].target_from_source))
         })
         .ok_or("a worker stopped")?;
-    (0..N)
-        .map(|column| {
-            let errors: Vec<PairError> = pairs
-                .iter()
-                .zip(&answers)
-                .map(|(pair, poses)| {
-                    PairError::new(poses.and_then(|p| p[column]).as_ref(), &pair.target_from_source)
-                })
-                .collect();
-            let s = Scores::from_errors(&errors)?;
-            Ok(format!("{:.2} / {:.2} / {:.2}", s.rmse_r, s.mae_r, s.median_rot_deg))
+    let of_column = |column: usize| {
+        let both = pairs.iter().zip(&answers);
+        both.map(|(pair, poses)| {
+            PairError::new(poses.and_then(|p| p[column]).as_ref(), &pair.target_from_source)
         })
         .collect()
+    };
+    Ok((0..N).map(of_column).collect())
+}
+
+/// `RMSE / MAE / median` of each column, over the pairs that are wanted.
+fn scores(errors: &[Vec<PairError>], wanted: impl Fn(usize) -> bool) -> Result<String, MetricError> {
+    let of_column = |errors: &Vec<PairError>| {
+        let chosen: Vec<PairError> = (0..errors.len()).filter(|&i| wanted(i)).map(|i| errors[i]).collect();
+        let s = Scores::from_errors(&chosen)?;
+        Ok(format!("{:.2} / {:.2} / {:.2}", s.rmse_r, s.mae_r, s.median_rot_deg))
+    };
+    Ok(errors.iter().map(of_column).collect::<Result<Vec<_>, _>>()?.join(" | "))
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use srrf_corrupt::{CorruptionKind, PairConfig};
-use srrf_model::{SkeletonLossConfig, SrrfConfig};
+use srrf_model::{SkeletonLossConfig, SrrfConfig, defaults};
 
 use crate::network::Trained;
 
@@ -164,20 +164,6 @@ pub struct DrawConfig {
     pub crop_keep: f64,
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "the form that serde calls")]
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
-fn one() -> f64 {
-    1.0
-}
-
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "the form that serde calls")]
-fn is_one(value: &f64) -> bool {
-    *value == 1.0
-}
-
 fn default_crop_keep() -> f64 {
     0.7
 }
@@ -190,16 +176,16 @@ pub struct LossConfig {
     pub skeleton: SkeletonLossConfig,
     /// Weight of `L_reg` of each branch; 1 is the paper. The other losses of a trained network are ten to a hundred
     /// times as large.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
+    #[serde(default = "defaults::one", skip_serializing_if = "defaults::is_one")]
     pub registration: f64,
     /// Weight of the correspondence loss of each branch; 0 is the paper.
     pub correspondence: f64,
     /// Weight of the matching loss of each branch ([`srrf_model::matching_loss`]); 0 is the paper.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "defaults::is_zero")]
     pub matching: f64,
     /// Weight of `L_reg` of the fused pose, beside `registration` for that of each branch. At 0 the integration is left
     /// out of the training step, which saves its inlier test; the branches learn from their own poses.
-    #[serde(default = "one")]
+    #[serde(default = "defaults::one")]
     pub fused: f64,
 }
 

@@ -1,12 +1,14 @@
 //! Training pairs: which shape, which corruption, which pose, all from (seed, number of the pair).
 
+use std::path::Path;
+
 use nalgebra::{Rotation3, Unit, Vector3};
 use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use srrf_cloud::shapes::ProceduralShapes;
-use srrf_cloud::source::{ShapeSource, SourceError};
+use srrf_cloud::source::{ACCEPTED_LAYOUTS, ShapeSource, SourceError, Split, held_out, open};
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::crop::{crop, random_direction};
 use srrf_corrupt::{
@@ -14,8 +16,47 @@ use srrf_corrupt::{
     Stream as PairStream,
 };
 
-use crate::config::{DrawConfig, TrainConfig};
+use crate::config::{DataSource, DrawConfig, TrainConfig};
 use crate::network::Trained;
+
+/// What a user without the data may do.
+const WITHOUT: &str = "to train without a download: srrf-train --config configs/shapes.toml";
+
+/// Why there are no shapes to train on.
+#[derive(Debug, thiserror::Error)]
+pub enum ShapesError {
+    /// The configuration wants ModelNet40, and nobody said where it is.
+    #[error(
+        "this configuration trains on ModelNet40; say where it is by --data PATH, $SRRF_DATA or `data.path`. \
+         {ACCEPTED_LAYOUTS}\n{WITHOUT}"
+    )]
+    NoPath,
+    /// It cannot be read.
+    #[error("{0}\n{WITHOUT}")]
+    Unreadable(#[source] SourceError),
+    /// The built-in shapes cannot be made.
+    #[error(transparent)]
+    BuiltIn(SourceError),
+}
+
+/// The shapes that a configuration asks for: built-in ones, or the training split at `data`, which comes before the path
+/// in the configuration.
+///
+/// # Errors
+/// [`ShapesError`] where they cannot be had.
+pub fn training_shapes<C: Trained>(
+    config: &TrainConfig<C>,
+    data: Option<&Path>,
+) -> Result<Box<dyn ShapeSource>, ShapesError> {
+    match (config.data.source, data.or(config.data.path.as_deref())) {
+        (DataSource::Shapes, _) => match ProceduralShapes::new(config.seed, config.data.shapes, None) {
+            Ok(shapes) => Ok(Box::new(shapes)),
+            Err(source) => Err(ShapesError::BuiltIn(source)),
+        },
+        (DataSource::Modelnet, Some(path)) => open(path, Split::Train).map_err(ShapesError::Unreadable),
+        (DataSource::Modelnet, None) => Err(ShapesError::NoPath),
+    }
+}
 
 /// Stream of a generator: keeps the draws of training, validation and shuffling apart.
 #[derive(Clone, Copy)]
@@ -56,10 +97,8 @@ impl TrainingPairs {
     /// # Errors
     /// [`PairError`] when the built-in shapes that `data.built_in` asks for cannot be made.
     pub fn new<C: Trained>(config: &TrainConfig<C>, shapes: Box<dyn ShapeSource>) -> Result<Self, PairError> {
-        let (count, held_out) = (shapes.len(), config.data.validation.min(shapes.len() / 2).max(1));
-        let stride = count as f64 / held_out as f64;
-        let validation: Vec<usize> = (0..held_out).map(|i| ((i as f64 + 0.5) * stride) as usize).collect();
-        let training = (0..count).filter(|i| validation.binary_search(i).is_err()).collect();
+        let validation = held_out(shapes.len(), config.data.validation);
+        let training = (0..shapes.len()).filter(|i| validation.binary_search(i).is_err()).collect();
         let drawn = &config.draw.corruptions;
         let kinds = if drawn.is_empty() { CorruptionKind::ALL.to_vec() } else { drawn.clone() };
         let pairs = PairConfig { keep_correspondence: false, ..config.pairs };

@@ -9,11 +9,10 @@ use std::time::Duration;
 use clap::Parser;
 use srrf_baselines::{DcpConfig, EquiGsprConfig, PanetConfig, PointNetLkConfig, RgmConfig};
 use srrf_cloud::profile;
-use srrf_cloud::shapes::ProceduralShapes;
-use srrf_cloud::source::{ACCEPTED_LAYOUTS, ShapeSource, Split, open};
 use srrf_model::{SrrfConfig, keep_freed_memory};
 use srrf_train::baseline::Baseline;
-use srrf_train::config::{DataSource, TrainConfig, method_of};
+use srrf_train::config::{TrainConfig, method_of};
+use srrf_train::data::training_shapes;
 use srrf_train::network::Trained;
 use srrf_train::run::{Existing, RunError, RunOptions, run};
 
@@ -102,7 +101,8 @@ fn train<C: Trained>(arguments: Arguments) -> Result<ExitCode, Failure> {
     let name = arguments.device.or(config.device.take()).unwrap_or_else(|| "flex".into());
     let devices = srrf_model::devices(&name).map_err(|e| usage(&e))?;
     config.device = Some(name.clone());
-    let shapes = shapes(&config, arguments.data.as_deref()).map_err(|e| Failure(2, e))?;
+    let shapes =
+        training_shapes(&config, arguments.data.as_deref()).map_err(|e| Failure(2, e.to_string()))?;
     let options = RunOptions {
         folder: arguments.run.unwrap_or_else(|| Path::new("runs").join(&config.name)),
         threads: arguments.threads.unwrap_or_else(cores),
@@ -154,20 +154,4 @@ fn train<C: Trained>(arguments: Arguments) -> Result<ExitCode, Failure> {
 
 fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
-}
-
-/// The shapes that the configuration asks for.
-fn shapes<C: Trained>(config: &TrainConfig<C>, data: Option<&Path>) -> Result<Box<dyn ShapeSource>, String> {
-    const WITHOUT: &str = "to train without a download: srrf-train --config configs/shapes.toml";
-    match (config.data.source, data.or(config.data.path.as_deref())) {
-        (DataSource::Shapes, _) => match ProceduralShapes::new(config.seed, config.data.shapes, None) {
-            Ok(shapes) => Ok(Box::new(shapes)),
-            Err(e) => Err(e.to_string()),
-        },
-        (DataSource::Modelnet, Some(path)) => open(path, Split::Train).map_err(|e| format!("{e}\n{WITHOUT}")),
-        (DataSource::Modelnet, None) => Err(format!(
-            "this configuration trains on ModelNet40; say where it is by --data PATH, $SRRF_DATA or `data.path`. \
-             {ACCEPTED_LAYOUTS}\n{WITHOUT}"
-        )),
-    }
 }

@@ -13,14 +13,12 @@ use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use srrf::{Features, Logistic, Options, Registrar, RotationRange};
 use srrf_cloud::shapes::ProceduralShapes;
-use srrf_cloud::source::{ShapeSource, Split, open};
+use srrf_cloud::source::{ShapeSource, Split, VALIDATION_SHAPES, held_out, open};
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::crop::{crop, random_direction};
 use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream};
 
 const SEED: u64 = 77_001;
-/// Shapes of the training split that the network was validated on: every n-th.
-const VALIDATION: usize = 192;
 
 struct Example {
     row: String,
@@ -125,8 +123,7 @@ fn pair(
         _ => (built_in, 1024),
     };
     let shape = if points == 512 || shapes.len() > 1000 {
-        let stride = shapes.len() as f64 / VALIDATION as f64;
-        ((rng.random_range(0..VALIDATION) as f64 + 0.5) * stride) as usize
+        held_out(shapes.len(), VALIDATION_SHAPES)[rng.random_range(0..VALIDATION_SHAPES)]
     } else {
         rng.random_range(0..shapes.len())
     };

@@ -11,15 +11,13 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use srrf_cloud::shapes::ProceduralShapes;
-use srrf_cloud::source::{ShapeSource, Split, open};
+use srrf_cloud::source::{ShapeSource, Split, VALIDATION_SHAPES, held_out, open};
 use srrf_cloud::{EulerXyz, Register, Rigid};
 use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream};
 use srrf_model::{SrrfRegister, device, embedded};
 use srrf_refine::{Metric, RefineConfig, RefineTarget, Verdict};
 
 const SEED: u64 = 77_002;
-/// Shapes that the default network was validated on: every n-th of the training split.
-const VALIDATION: usize = 192;
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -42,7 +40,7 @@ fn main() {
         "corruption,sampling,severity,shape,class,start,full,cautious,halfway,rule,verdict,normal_correlation,correlation,median,\
          support_start,support_full,support_cautious,fitness,inlier_rmse,moved_full,moved_cautious,wide,fused_halfway,bend,affine_gain"
     );
-    let lines: Vec<String> = (0..VALIDATION * CorruptionKind::ALL.len())
+    let lines: Vec<String> = (0..VALIDATION_SHAPES * CorruptionKind::ALL.len())
         .into_par_iter()
         .filter(|i| (i / CorruptionKind::ALL.len()).is_multiple_of(every))
         .filter(|i| only.is_none_or(|kind| CorruptionKind::ALL[i % 12] == kind))
@@ -53,7 +51,7 @@ fn main() {
             let independent = shape % 2 == 1;
             let shapes: &dyn ShapeSource = if independent { &built_in } else { shapes.as_ref() };
             let synthesizer = &synthesizers[usize::from(independent)];
-            let index = ((shape as f64 + 0.5) * shapes.len() as f64 / VALIDATION as f64) as usize;
+            let index = held_out(shapes.len(), VALIDATION_SHAPES)[shape];
             let stream = Stream { seed: SEED, item: i as u64 };
             let pair = synthesizer
                 .pair(shapes, index, Some((kind, severity)), PoseDraw::Seeded, stream)

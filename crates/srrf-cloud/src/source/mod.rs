@@ -21,6 +21,17 @@ pub use error::{ACCEPTED_LAYOUTS, SourceError};
 pub const SYMMETRIC_CLASSES: [&str; 8] =
     ["bottle", "bowl", "cone", "cup", "flower_pot", "lamp", "tent", "vase"];
 
+/// Shapes that are held out for validation: `count` of `shapes`, evenly spread, in ascending order. At least one and at
+/// most half of them.
+pub fn held_out(shapes: usize, count: usize) -> Vec<usize> {
+    let count = count.min(shapes / 2).max(1);
+    let stride = shapes as f64 / count as f64;
+    (0..count).map(|i| ((i as f64 + 0.5) * stride) as usize).collect()
+}
+
+/// Shapes that the network of the program, `srrf`, was validated with ([`held_out`]): `data.validation` of its configuration.
+pub const VALIDATION_SHAPES: usize = 192;
+
 /// A set of shapes from which registration pairs are made.
 #[allow(clippy::len_without_is_empty, reason = "a source is never empty")]
 pub trait ShapeSource: Send + Sync {
@@ -131,4 +142,19 @@ fn candidates(path: &Path) -> Result<Vec<PathBuf>, SourceError> {
 /// The path in the environment variable `SRRF_DATA`, if it is set and not empty.
 pub fn default_data_path() -> Option<PathBuf> {
     std::env::var_os("SRRF_DATA").filter(|value| !value.is_empty()).map(PathBuf::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::held_out;
+
+    #[test]
+    fn held_out_shapes_are_spread_and_never_more_than_half() {
+        assert_eq!(held_out(12, 3), [2, 6, 10]);
+        assert_eq!(held_out(5, 100), [1, 3]);
+        assert_eq!(held_out(1, 0), [0]);
+        let many = held_out(9843, 192);
+        assert_eq!(many.len(), 192);
+        assert!(many.windows(2).all(|pair| pair[1] - pair[0] >= 51), "{many:?}");
+    }
 }
