@@ -131,7 +131,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let held_out = pairs.validation(Severity::try_from(severity)?)?;
             let answers =
                 workers.map(held_out.len(), |i| judge(&method, &held_out[i])).ok_or("a worker stopped")?;
-            judged.extend(answers.into_iter().flatten());
+            let answers: Option<Vec<Judged>> = answers.into_iter().collect();
+            judged.extend(answers.ok_or("a pair has no answer of both branches")?);
         }
     }
     println!(
