@@ -3,7 +3,7 @@
 //! The tables of docs/experiments.md come from
 //!
 //! ```sh
-//! cargo run -p srrf-train --example fusion_choices -- configs/modelnet-gpu-3.toml srrf DATA --seeds 6,7,8
+//! cargo run -p srrf-train --example fusion_choices -- configs/modelnet-gpu-3-end.toml srrf DATA --seeds 6,7,8
 //! ```
 
 use std::path::PathBuf;
