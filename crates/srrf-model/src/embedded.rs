@@ -37,7 +37,7 @@ pub fn contains(name: &str) -> bool {
 }
 
 /// An embedded model by name: `srrf` (trained on ModelNet40, the default), `srrf-small` (trained on the same shapes,
-/// half the time) or `srrf-shapes` (trained on the built-in shapes). `None` if there is no model of that name. What
+/// seven tenths of the time) or `srrf-shapes` (trained on the built-in shapes). `None` if there is no model of that name. What
 /// they were trained from lies beside them as files, `srrf-start`, `srrf-2`, `srrf-small-start` and `srrf-small-2`. `srrf-ddl`
 /// and `srrf-no-ddl` are two skeleton modules to compare, whose branches are untrained.
 pub fn load(name: &str, device: &Device) -> Option<Result<LoadedModel, WeightsError>> {
