@@ -100,7 +100,7 @@ def job(name, source, target, out, voxel, threads):
     pathlib.Path(out).write_text(json.dumps({"pose": np.asarray(pose).tolist(), "seconds": seconds}))
 
 
-def by_open3d(source, target, voxel, _threads):
+def by_open3d(source, target, voxel, _threads, icp=0.4):
     clouds = [o3d.io.read_point_cloud(path) for path in (source, target)]
     begun = time.perf_counter()
     o3d.utility.random.seed(1)
@@ -122,7 +122,7 @@ def by_open3d(source, target, voxel, _threads):
          registration.CorrespondenceCheckerBasedOnDistance(distance)],
         registration.RANSACConvergenceCriteria(100000, 0.999))
     fine = registration.registration_icp(
-        s, t, 0.4 * voxel, coarse.transformation, registration.TransformationEstimationPointToPlane())
+        s, t, icp * voxel, coarse.transformation, registration.TransformationEstimationPointToPlane())
     return fine.transformation, time.perf_counter() - begun
 
 

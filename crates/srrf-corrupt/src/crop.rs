@@ -1,7 +1,9 @@
-//! Partial overlap: the part of a cloud on one side of a plane.
+//! Partial overlap: the part of a cloud on one side of a plane, and the part that is seen from one side.
 //!
 //! Not one of the paper's corruptions. RPMNet's partial pairs (Yew and Lee 2020, `RandomCrop`) keep
 //! the 70% of each cloud that lie farthest along a random direction, independently for the two.
+
+use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use rand::RngExt;
@@ -17,6 +19,29 @@ pub fn crop(points: &[[f64; 3]], direction: &Vector3<f64>, keep: f64) -> Vec<usi
     order.truncate(((keep.clamp(0.0, 1.0) * points.len() as f64).round() as usize).max(1));
     order.sort_unstable();
     order
+}
+
+/// Indices of the points that a camera far away in `direction` (a unit vector) sees, in the order of the cloud: in each
+/// pixel, `pixel` wide, those less than `depth` behind the foremost one. Both are lengths in the units of the cloud; a pixel of
+/// two to three point spacings lets nothing shine through.
+pub fn visible(points: &[[f64; 3]], direction: &Vector3<f64>, pixel: f64, depth: f64) -> Vec<usize> {
+    let across = direction.cross(&Vector3::from_fn(|i, _| if i == direction.iamin() { 1.0 } else { 0.0 }));
+    let along = direction.cross(&across);
+    let seen: Vec<([i64; 2], f64)> = points
+        .iter()
+        .map(|p| {
+            let p = Vector3::from(*p);
+            (
+                [&across, &along].map(|axis| (p.dot(axis) / (axis.norm() * pixel)).floor() as i64),
+                p.dot(direction),
+            )
+        })
+        .collect();
+    let mut foremost: BTreeMap<[i64; 2], f64> = BTreeMap::new();
+    for (at, height) in &seen {
+        foremost.entry(*at).and_modify(|h| *h = h.max(*height)).or_insert(*height);
+    }
+    (0..points.len()).filter(|&i| seen[i].1 > foremost[&seen[i].0] - depth).collect()
 }
 
 /// A direction drawn evenly from the sphere.
@@ -44,6 +69,25 @@ mod tests {
         assert!(kept.iter().all(|&i| points[i][0] >= 7.0));
         assert_eq!(crop(&points, &Vector3::x(), 0.0).len(), 1);
         assert_eq!(crop(&points, &Vector3::x(), 2.0).len(), 11);
+    }
+
+    #[test]
+    fn a_camera_sees_the_near_sheet_alone() {
+        // Two sheets, one above the other; the upper one has a hole.
+        let sheet = |z: f64| (0..100).map(move |i| [f64::from(i % 10), f64::from(i / 10), z]);
+        let points: Vec<[f64; 3]> =
+            sheet(0.0).chain(sheet(3.0).filter(|p| p[0] > 2.5 || p[1] > 2.5)).collect();
+        let upper = |i: usize| points[i][2] > 1.0;
+        for (direction, hidden) in [(Vector3::z(), 91), (-Vector3::z(), 91)] {
+            let seen = visible(&points, &direction, 0.9, 1.0);
+            assert_eq!(seen.len(), points.len() - hidden, "{direction}");
+            assert!(seen.is_sorted());
+            let above = seen.iter().filter(|&&i| upper(i)).count();
+            assert_eq!(above, if direction.z > 0.0 { 91 } else { 0 }, "{direction}");
+        }
+        // A depth beyond the distance of the sheets sees both.
+        assert_eq!(visible(&points, &Vector3::z(), 0.9, 3.5).len(), points.len());
+        assert!(visible(&[], &Vector3::z(), 1.0, 1.0).is_empty());
     }
 
     #[test]

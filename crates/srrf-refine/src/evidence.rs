@@ -59,7 +59,7 @@ pub(crate) fn evidence(source: &Prepared, target: &Prepared, pose: &Rigid) -> Ev
     let limit = spacing * spacing;
     let mut sums = NormalEquations::default();
     let (mut inliers, mut squares) = (0, 0.0);
-    for mut found in side_matches(s, t, &local, Side::Source) {
+    for (_, mut found) in side_matches(s, t, &local, Side::Source) {
         let squared = (found.moved - found.fixed).norm_squared();
         if squared <= limit {
             inliers += 1;
@@ -70,7 +70,7 @@ pub(crate) fn evidence(source: &Prepared, target: &Prepared, pose: &Rigid) -> Ev
     }
     let covered = side_matches(s, t, &local, Side::Target)
         .iter()
-        .filter(|m| (m.moved - m.fixed).norm_squared() <= limit)
+        .filter(|(_, m)| (m.moved - m.fixed).norm_squared() <= limit)
         .count();
     Evidence {
         spacing,

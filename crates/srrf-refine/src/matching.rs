@@ -32,7 +32,7 @@ pub(crate) enum Side {
     Target,
 }
 
-/// The match of the `i`-th point of a side.
+/// The match of the `i`-th point of a side, after its index in the other cloud.
 pub(crate) fn nearest(
     source: &Level,
     target: &Level,
@@ -40,24 +40,24 @@ pub(crate) fn nearest(
     inverse: &Rigid,
     side: Side,
     i: usize,
-) -> Match {
+) -> (usize, Match) {
     match side {
         Side::Source => {
             let moved = pose.apply(&source.points()[i]);
             let (j, _) = target.index.nearest(&moved);
-            Match { moved: moved.into(), fixed: target.points()[j].into(), normal: target.normals[j] }
+            (j, Match { moved: moved.into(), fixed: target.points()[j].into(), normal: target.normals[j] })
         }
         Side::Target => {
             let fixed = target.points()[i];
             let (j, _) = source.index.nearest(&inverse.apply(&fixed));
             let moved = pose.apply(&source.points()[j]);
-            Match { moved: moved.into(), fixed: fixed.into(), normal: pose.rotation * source.normals[j] }
+            (j, Match { moved: moved.into(), fixed: fixed.into(), normal: pose.rotation * source.normals[j] })
         }
     }
 }
 
-/// The matches of a side, in the order of its points.
-pub(crate) fn side_matches(source: &Level, target: &Level, pose: &Rigid, side: Side) -> Vec<Match> {
+/// The matches of a side, in the order of its points, each after its index in the other cloud.
+pub(crate) fn side_matches(source: &Level, target: &Level, pose: &Rigid, side: Side) -> Vec<(usize, Match)> {
     let n = if side == Side::Source { source.points().len() } else { target.points().len() };
     let inverse = pose.inverse();
     let parts = chunked(n, |range| {
@@ -81,7 +81,7 @@ pub(crate) fn equations(
         let parts = chunked(n.div_ceil(stride), |range| {
             let mut part = NormalEquations::default();
             for i in range {
-                let found = nearest(source, target, pose, &inverse, side, i * stride);
+                let (_, found) = nearest(source, target, pose, &inverse, side, i * stride);
                 if let Some((a, b)) = weigh(&found) {
                     part.add(&found, a, b);
                 }
@@ -96,7 +96,10 @@ pub(crate) fn equations(
 /// Squared distances of the matches of both sides, source first.
 pub(crate) fn squared_distances(source: &Level, target: &Level, pose: &Rigid) -> [Vec<f64>; 2] {
     [Side::Source, Side::Target].map(|side| {
-        side_matches(source, target, pose, side).iter().map(|m| (m.moved - m.fixed).norm_squared()).collect()
+        side_matches(source, target, pose, side)
+            .iter()
+            .map(|(_, m)| (m.moved - m.fixed).norm_squared())
+            .collect()
     })
 }
 

@@ -8,6 +8,7 @@
 
 use std::path::Path;
 
+use nalgebra::Matrix3;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
@@ -15,7 +16,7 @@ use srrf::{Features, Logistic, Options, Registrar, RotationRange};
 use srrf_cloud::shapes::ProceduralShapes;
 use srrf_cloud::source::{ShapeSource, Split, VALIDATION_SHAPES, held_out, open};
 use srrf_cloud::{PointCloud, Rigid};
-use srrf_corrupt::crop::{crop, random_direction};
+use srrf_corrupt::crop::{crop, random_direction, visible};
 use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream};
 
 const SEED: u64 = 77_001;
@@ -53,7 +54,7 @@ fn main() {
     };
     let (fitted, held_out) = (fitted.as_slice(), held_out.as_slice());
     let what = format!(
-        "{} pairs of {}; 12 corruptions, clean and cropped, severities 1 to 5, seed {SEED}",
+        "{} pairs of {}; 12 corruptions, clean, cropped and seen from one side, severities 1 to 5, seed {SEED}",
         fitted.len(),
         if modelnet.is_some() {
             "built-in shapes and validation shapes of ModelNet40's training split"
@@ -140,11 +141,25 @@ fn pair(
     let pair = synthesizer.pair(shapes, shape, kind.map(|k| (k, severity)), pose, stream).unwrap();
     let (mut source, mut target) = (pair.source, pair.target);
     let mut row = kind.map_or("clean".to_owned(), |k| k.to_string());
+    let keep = |cloud: &mut PointCloud, kept: Vec<usize>| {
+        *cloud = PointCloud::new(kept.into_iter().map(|i| cloud.points()[i]).collect()).unwrap();
+    };
     if rng.random_bool(0.25) {
         row = "cropped".to_owned();
         for cloud in [&mut source, &mut target] {
             let kept = crop(cloud.points(), &random_direction(&mut rng), rng.random_range(0.5..1.0));
-            *cloud = PointCloud::new(kept.into_iter().map(|i| cloud.points()[i]).collect()).unwrap();
+            keep(cloud, kept);
+        }
+    } else if rng.random_bool(0.15) {
+        // Two cameras some 40 degrees apart.
+        row = "one view".to_owned();
+        let camera = random_direction(&mut rng);
+        for (cloud, frame) in
+            [(&mut source, Matrix3::identity()), (&mut target, pair.target_from_source.rotation)]
+        {
+            let from = frame * (camera + 0.5 * random_direction(&mut rng)).normalize();
+            let kept = visible(cloud.points(), &from, 0.1, 0.15);
+            keep(cloud, kept);
         }
     }
     (row, source, target, pair.target_from_source)

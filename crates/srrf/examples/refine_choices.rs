@@ -3,30 +3,38 @@
 //! refinement, of a cautious one, of halfway between the network and that, and of the answer by the rule, beside
 //! what the rule sees.
 //!
-//! `cargo run --release -p srrf --example refine_choices -- MODELNET [EVERY [CORRUPTION]] > choices.csv` takes every so many of
+//! `cargo run --release -p srrf --example refine_choices -- MODELNET [EVERY [ROW]] > choices.csv` takes every so many of
 //! these shapes (default: each); every other one of the 192 gives its place to a built-in shape, so an even number takes none of those.
+//! Beside the corruptions there are the rows `crop` (each cloud keeps 60 to 100 % of itself, on its own side of a plane) and `view`
+//! (what two cameras some 40 degrees apart see).
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
 
 use std::path::Path;
 
+use nalgebra::Matrix3;
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use srrf_cloud::shapes::ProceduralShapes;
 use srrf_cloud::source::{ShapeSource, Split, VALIDATION_SHAPES, held_out, open};
-use srrf_cloud::{EulerXyz, Register, Rigid};
-use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream};
+use srrf_cloud::{EulerXyz, PointCloud, Register, Rigid};
+use srrf_corrupt::crop::{crop, random_direction, visible};
+use srrf_corrupt::{CorruptionKind, Pair, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream};
 use srrf_model::{SrrfRegister, device, embedded};
 use srrf_refine::{Metric, RefineConfig, RefineTarget, Verdict};
 
 const SEED: u64 = 77_002;
+/// Rows without a corruption.
+const PARTIAL: [&str; 2] = ["crop", "view"];
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let Some(data) = arguments.next() else {
-        println!("usage: refine_choices MODELNET [EVERY [CORRUPTION]]");
+        println!("usage: refine_choices MODELNET [EVERY [ROW]]");
         return;
     };
     let every: usize = arguments.next().map_or(1, |n| n.parse().unwrap());
-    let only: Option<CorruptionKind> = arguments.next().map(|name| name.parse().unwrap());
+    let only = arguments.next();
     let shapes = open(Path::new(&data), Split::Train).unwrap();
     let flex = device("flex").unwrap();
     let network = SrrfRegister::new(embedded::load_default(&flex).unwrap(), flex);
@@ -38,24 +46,36 @@ fn main() {
 
     println!(
         "corruption,sampling,severity,shape,class,start,full,cautious,halfway,rule,verdict,normal_correlation,correlation,median,\
-         support_start,support_full,support_cautious,fitness,inlier_rmse,moved_full,moved_cautious,wide,fused_halfway,bend,affine_gain"
+         support_start,support_full,support_cautious,fitness,inlier_rmse,moved_full,moved_cautious,across,fused_halfway,bend,affine_gain"
     );
-    let lines: Vec<String> = (0..VALIDATION_SHAPES * CorruptionKind::ALL.len())
+    let rows: Vec<&str> = CorruptionKind::ALL.iter().map(|kind| kind.name()).chain(PARTIAL).collect();
+    assert!(only.as_deref().is_none_or(|name| rows.contains(&name)), "the rows are {rows:?}");
+    let held = held_out(shapes.len(), VALIDATION_SHAPES);
+    let pairs: Vec<(usize, usize)> = (0..VALIDATION_SHAPES)
+        .step_by(every)
+        .flat_map(|shape| (0..rows.len()).map(move |row| (shape, row)))
+        .filter(|(_, row)| only.as_deref().is_none_or(|name| rows[*row] == name))
+        .collect();
+    let lines: Vec<String> = pairs
         .into_par_iter()
-        .filter(|i| (i / CorruptionKind::ALL.len()).is_multiple_of(every))
-        .filter(|i| only.is_none_or(|kind| CorruptionKind::ALL[i % 12] == kind))
-        .map(|i| {
-            let (shape, kind) = (i / CorruptionKind::ALL.len(), CorruptionKind::ALL[i % 12]);
+        .map(|(shape, row)| {
+            let kinds = CorruptionKind::ALL.len();
+            let kind = CorruptionKind::ALL.get(row);
+            // Numbers that stay when rows are added.
+            let i = if row < kinds { shape * kinds + row } else { (VALIDATION_SHAPES + shape) * kinds + row };
             let severity = Severity::ALL[(shape + i) % 5];
             // Every other shape is built in and sampled twice.
             let independent = shape % 2 == 1;
             let shapes: &dyn ShapeSource = if independent { &built_in } else { shapes.as_ref() };
             let synthesizer = &synthesizers[usize::from(independent)];
-            let index = held_out(shapes.len(), VALIDATION_SHAPES)[shape];
+            let index = if independent { held_out(built_in.len(), VALIDATION_SHAPES)[shape] } else { held[shape] };
             let stream = Stream { seed: SEED, item: i as u64 };
-            let pair = synthesizer
-                .pair(shapes, index, Some((kind, severity)), PoseDraw::Seeded, stream)
+            let mut pair = synthesizer
+                .pair(shapes, index, kind.map(|kind| (*kind, severity)), PoseDraw::Seeded, stream)
                 .unwrap();
+            if kind.is_none() {
+                partial(rows[row], &mut pair, stream);
+            }
             let found = network.register(&pair.source, &pair.target).unwrap();
             let mut starts: Vec<(&str, Rigid)> = vec![("answer", found.target_from_source)];
             starts.extend(found.branches.iter().map(|b| (b.name, b.target_from_source)));
@@ -85,7 +105,7 @@ fn main() {
             };
             format!(
                 "{},{},{},{index},{},{:.6},{:.6},{:.6},{:.6},{:.6},{},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.4},{:.6},{:.4},{:.4},{:.4},{:.6},{:.4},{:.4}",
-                kind.name(),
+                rows[row],
                 if independent { "independent" } else { "shared" },
                 severity.get(),
                 shapes.class(index),
@@ -109,7 +129,7 @@ fn main() {
                 full.evidence.inlier_rmse / full.evidence.spacing,
                 start.angle_to_deg(&full.target_from_source),
                 start.angle_to_deg(&cautious.target_from_source),
-                full.residuals.wide_correlation,
+                full.residuals.across_correlation,
                 error(&fused_halfway),
                 rule.affine.map_or(f64::NAN, |fit| fit.bend),
                 rule.affine.map_or(f64::NAN, |fit| fit.gain),
@@ -117,6 +137,24 @@ fn main() {
         })
         .collect();
     lines.iter().for_each(|line| println!("{line}"));
+}
+
+/// Leaves a part of either cloud.
+fn partial(row: &str, pair: &mut Pair, stream: Stream) {
+    let mut rng = ChaCha8Rng::seed_from_u64(stream.seed);
+    rng.set_stream(stream.item);
+    let camera = random_direction(&mut rng);
+    for (cloud, frame) in
+        [(&mut pair.source, Matrix3::identity()), (&mut pair.target, pair.target_from_source.rotation)]
+    {
+        let side = random_direction(&mut rng);
+        let kept = if row == "crop" {
+            crop(cloud.points(), &side, rng.random_range(0.6..1.0))
+        } else {
+            visible(cloud.points(), &(frame * (camera + 0.5 * side).normalize()), 0.1, 0.15)
+        };
+        *cloud = PointCloud::new(kept.into_iter().map(|i| cloud.points()[i]).collect()).unwrap();
+    }
 }
 
 fn between(a: &Rigid, b: &Rigid) -> Rigid {

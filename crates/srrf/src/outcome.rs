@@ -109,7 +109,7 @@ impl Outcome {
                 "iterations": r.iterations,
                 "support": r.support,
                 "residual_correlation": r.residuals.correlation,
-                "residual_correlation_wide": r.residuals.wide_correlation,
+                "residual_correlation_across": r.residuals.across_correlation,
                 "starts": r.starts.iter().map(|s| json!({ "name": s.name, "support": s.support })).collect::<Vec<_>>(),
             })),
             "evidence": {

@@ -1,0 +1,185 @@
+"""Meshes of another world, sampled twice, with corruptions of another generator: what `srrf batch` and Open3D make of them.
+
+    pip install open3d trimesh numpy
+    cargo build --release -p srrf
+    python3 scripts/other_meshes.py MESHES --srrf target/release/srrf > table.md
+
+MESHES is a folder; where it holds no meshes, two wheels are taken from PyPI and unpacked there (MetaWorld's objects, MIT, and
+dm_control's dog and robots, Apache-2.0): household objects, bones, robot parts. Nothing of the project was trained or
+tuned on them. `--wheels` names others.
+
+Each mesh is sampled twice on its own, scaled to the unit ball, and each sample is treated on its own by the rows below, all in
+numpy; then the target is moved by any rotation and by up to 0.5 along each axis. A pose is right within 5 degrees and a tenth of
+the target's radius (root mean square) where the source's centroid lands. Some meshes are symmetric: there nobody can be right for
+certain, and the rows say how the methods compare, not what can be reached.
+
+Open3D: FPFH + RANSAC + point-to-plane ICP as in scans.py; the voxel (of 0.04 to 0.13) and the distance of ICP (of 0.4 to 2 voxels)
+are the best on 120 such pairs of other meshes (robosuite's).
+"""
+
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import zipfile
+
+import numpy as np
+import trimesh
+
+import scans
+
+WHEELS = ["metaworld==3.1.1", "dm_control==1.0.50"]
+POINTS = 1024
+ICP = 2.0  # voxels
+ENDINGS = {".stl", ".obj", ".ply", ".off"}
+
+
+def meshes(folder, wheels, count):
+    """`count` meshes with some depth, no two of the same proportions, spread over the folder."""
+    if not folder.exists() or not any(p.suffix.lower() in ENDINGS for p in folder.rglob("*")):
+        folder.mkdir(parents=True, exist_ok=True)
+        command = [sys.executable, "-m", "pip", "download", "--no-deps", "--quiet", "--dest", folder, *wheels]
+        subprocess.run([str(word) for word in command], check=True, stdout=sys.stderr)
+        for wheel in sorted(folder.glob("*.whl")):
+            with zipfile.ZipFile(wheel) as z:
+                z.extractall(folder / wheel.stem.split("-")[0])
+    found, seen = [], set()
+    for path in sorted(p for p in folder.rglob("*") if p.suffix.lower() in ENDINGS and "collision" not in str(p).lower()):
+        try:
+            mesh = trimesh.load(path, force="mesh", process=False)
+        except Exception:  # whatever trimesh cannot read is no mesh for this table
+            continue
+        if len(mesh.faces) < 100 or not np.isfinite(mesh.vertices).all():
+            continue
+        sides = np.sort(mesh.extents)
+        key = tuple(np.round(sides / sides[2], 3)) if sides[2] > 0 else None
+        if key is None or sides[0] < 0.1 * sides[2] or key in seen:
+            continue
+        seen.add(key)
+        found.append(mesh)
+    if len(found) < count:
+        sys.exit(f"{folder} holds {len(found)} meshes that can be used, and --meshes asks for {count}")
+    return [found[i] for i in np.linspace(0, len(found) - 1, count).astype(int)]
+
+
+class Rows:
+    """What is done to a dense sample of a mesh, shape [n, 3], before it is a cloud."""
+
+    def __init__(self, rng):
+        self.rng = rng
+        self.camera = None
+        self.names = {
+            "clean": lambda p: self.some(p), "noise 0.01": lambda p: self.noise(self.some(p), 0.01),
+            "noise 0.03": lambda p: self.noise(self.some(p), 0.03), "outliers 15 %": self.outliers, "holes": self.holes,
+            "85 % kept": lambda p: self.cropped(p, 0.85), "70 % kept": lambda p: self.cropped(p, 0.7),
+            "one view": self.view, "uneven density": self.gradient, "two at once": self.two,
+        }
+
+    def unit(self):
+        v = self.rng.normal(size=3)
+        return v / np.linalg.norm(v)
+
+    def some(self, p, count=POINTS):
+        return p[self.rng.choice(len(p), count, replace=len(p) < count)]
+
+    def noise(self, p, sigma):
+        return p + self.rng.normal(size=p.shape) * sigma
+
+    def outliers(self, p):
+        n = round(0.15 * POINTS)
+        return np.vstack([self.some(p, POINTS - n), self.rng.uniform(-1, 1, (n, 3))])
+
+    def holes(self, p):
+        for _ in range(4):  # each takes the fourteenth part of what is left, about a point
+            distance = np.linalg.norm(p - p[self.rng.integers(len(p))], axis=1)
+            p = p[np.argsort(distance)[len(p) // 14:]]
+        return self.some(p)
+
+    def cropped(self, p, keep):
+        height = p @ self.unit()
+        return self.some(p[height <= np.quantile(height, keep)], round(keep * POINTS))
+
+    def view(self, p):
+        """What a far camera sees, the two cameras some 30 degrees apart."""
+        d = self.camera + 0.5 * self.unit()
+        d /= np.linalg.norm(d)
+        a = np.cross(d, [0.3, 0.5, 0.8])
+        a /= np.linalg.norm(a)
+        cell = np.floor(np.stack([p @ a, p @ np.cross(d, a)]) / 0.05).astype(int)
+        _, pixel = np.unique(cell, axis=1, return_inverse=True)
+        front = np.full(pixel.max() + 1, -np.inf)
+        np.maximum.at(front, pixel.ravel(), p @ d)
+        return self.some(p[p @ d > front[pixel.ravel()] - 0.08])
+
+    def gradient(self, p):
+        height = p @ self.unit()
+        weight = 0.05 + ((height - height.min()) / (np.ptp(height) + 1e-9)) ** 2
+        return p[self.rng.choice(len(p), POINTS, replace=False, p=weight / weight.sum())]
+
+    def two(self, p):
+        if self.rng.random() < 0.5:
+            return self.noise(self.holes(p), 0.015)
+        return self.outliers(self.cropped(p, 0.85))
+
+    def pair(self, mesh, work):
+        """Source, target and the pose between them."""
+        draw = lambda n: trimesh.sample.sample_surface(mesh, n, seed=int(self.rng.integers(1 << 30)))[0]
+        frame = draw(4000)
+        centre = frame.mean(0)
+        size = np.linalg.norm(frame - centre, axis=1).max()
+        self.camera = self.unit()
+        source, target = (work((draw(6000) - centre) / size) for _ in range(2))
+        q = self.rng.normal(size=4)
+        pose = trimesh.transformations.quaternion_matrix(q / np.linalg.norm(q))
+        pose[:3, 3] = self.rng.uniform(-0.5, 0.5, 3)
+        return source, target @ pose[:3, :3].T + pose[:3, 3], pose
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=pathlib.Path, metavar="MESHES")
+    parser.add_argument("--srrf", default="target/release/srrf")
+    parser.add_argument("--meshes", type=int, default=40)
+    parser.add_argument("--wheels", nargs="+", default=WHEELS)
+    parser.add_argument("--voxel", type=float, default=0.06, help="of Open3D; the clouds have a radius of about 0.6")
+    parser.add_argument("--rotation", choices=["45", "180"], default="180", help="what srrf is told of the rotation")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    scans.o3d.utility.set_verbosity_level(scans.o3d.utility.VerbosityLevel.Error)
+    shapes = meshes(arguments.folder, arguments.wheels, arguments.meshes)
+    rows = Rows(np.random.default_rng(arguments.seed))
+    pairs = [(name, *rows.pair(mesh, work)) for name, work in rows.names.items() for mesh in shapes]
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        lines = ["source,target"]
+        for i, (_, source, target, _) in enumerate(pairs):
+            for which, points in (("x", source), ("y", target)):
+                scans.o3d.io.write_point_cloud(str(folder / f"{i}{which}.ply"), scans.cloud(points))
+            lines.append(f"{i}x.ply,{i}y.ply")
+        (folder / "pairs.csv").write_text("\n".join(lines) + "\n")
+        scans.run([arguments.srrf, "batch", folder / "pairs.csv", "-o", folder / "out.jsonl", "--quiet",
+                   "--rotation", arguments.rotation])
+        by_srrf = [json.loads(line) for line in (folder / "out.jsonl").read_text().splitlines()]
+        by_peer = [scans.by_open3d(*(str(folder / f"{i}{w}.ply") for w in "xy"), arguments.voxel, 1, ICP)[0]
+                   for i in range(len(pairs))]
+
+    print("| | srrf right | median, degrees | abstained | right of the others | mean p | Open3D right | median, degrees |")
+    print("|---|---|---|---|---|---|---|---|")
+    scored = [
+        (name, *scans.errors(np.array(ours["target_from_source"]), pose, source, target)[::2], ours["abstain"],
+         ours["probability"], *scans.errors(np.asarray(peer), pose, source, target)[::2])
+        for (name, source, target, pose), ours, peer in zip(pairs, by_srrf, by_peer)
+    ]
+    for name in [*rows.names, "all"]:
+        degrees, right, abstain, p, peer_degrees, peer_right = (
+            np.array(column) for column in list(zip(*(s for s in scored if name in (s[0], "all"))))[1:])
+        others = right[~abstain].mean() if (~abstain).any() else np.nan
+        print(f"| {name} | {right.mean():.2f} | {np.median(degrees):.2f} | {abstain.mean():.2f} | {others:.2f} | {p.mean():.2f} | "
+              f"{peer_right.mean():.2f} | {np.median(peer_degrees):.2f} |")
+
+
+if __name__ == "__main__":
+    main()
