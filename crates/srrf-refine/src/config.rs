@@ -33,8 +33,8 @@ impl Metric {
 #[serde(rename_all = "snake_case")]
 pub enum Deformed {
     /// The first start that agrees with the best one, as it was given: never worse than a learned method, which
-    /// knows shapes. So a pose that is turned by more than 20 degrees away from its start counts as deformed, too, and one that
-    /// an affine map fits better ([`crate::AffineFit`]), unless half of the matches coincide.
+    /// knows shapes. So a pair that an affine map fits better than the refined pose ([`crate::AffineFit`]) counts as deformed, too, most of
+    /// all where that pose is turned by more than 20 degrees away from its start, unless half of the matches coincide.
     #[default]
     Start,
     /// Halfway from that start to where point to point leads, for starts that know no shapes and may be far off.

@@ -21,16 +21,15 @@ use crate::{Deformed, Metric, RefineConfig, RefineError};
 /// refinement would follow (`docs/experiments.md`).
 const DEFORMED_NEAR: f64 = 0.15;
 const DEFORMED_ACROSS: f64 = 0.09;
-/// Lower numbers do where the refinement turns by more than this away from the start of a method that knows shapes: sheared boxes fit
-/// as well in a wrong pose as noisy ones in the right one, so that no support speaks for it.
-const WANDERED_DEG: f64 = 20.0;
-const WANDERED_NEAR: f64 = 0.12;
-const WANDERED_ACROSS: f64 = 0.06;
-/// And so does an affine map that moves the points by more than this, in point spacings, away from any rigid motion, and
-/// has more support than the pose by more than the second number. Of the rigid pairs of the same examples, partial views among
-/// them, that pass the first test and do not coincide, none gains as much (`docs/experiments.md`).
+/// So does an affine map that moves the points by more than this, in point spacings, away from any rigid motion, and has more
+/// support than the pose by more than the second number. Partial views of rigid shapes gain less (`docs/experiments.md`).
 const SHEARED_BEND: f64 = 0.75;
 const SHEARED_GAIN: f64 = 0.05;
+/// Where the refinement turns by more than the first number away from the start of a method that knows shapes, a gain of the second is
+/// enough: a sheared box fits as well in a wrong pose as a noisy one in the right one, but where a turn repairs the start, no affine
+/// map is better.
+const WANDERED_DEG: f64 = 20.0;
+const WANDERED_GAIN: f64 = 0.01;
 /// Not so where half of the matches are closer than this, in point spacings: the clouds then share
 /// points, and what is left over are holes.
 const COINCIDENT: f64 = 0.15;
@@ -142,17 +141,16 @@ impl Run<'_> {
         let mut kept = best.given;
         let mut support = self.support(&stage.pose);
         let knows_shapes = self.config.deformed == Deformed::Start;
-        let structured = |near, across| residuals.correlation > near && residuals.across_correlation > across;
         let wandered = knows_shapes
-            && structured(WANDERED_NEAR, WANDERED_ACROSS)
             && best.given.angle_to_deg(&to_global(&stage.pose, self.source, self.target)) > WANDERED_DEG;
         // Neighbours in large clouds sample one smooth surface: their residuals always hang together.
         let small = !self.source.has_coarse() && !self.target.has_coarse();
         let asked = self.config.check_deformation && small && residuals.median > COINCIDENT;
-        let bent = wandered || structured(DEFORMED_NEAR, DEFORMED_ACROSS);
+        let bent = residuals.correlation > DEFORMED_NEAR && residuals.across_correlation > DEFORMED_ACROSS;
         let affine = (asked && knows_shapes && !bent)
             .then(|| affine_fit(self.source.coarse(), self.target.coarse(), &stage.pose, support));
-        let sheared = affine.is_some_and(|fit| fit.bend > SHEARED_BEND && fit.gain > SHEARED_GAIN);
+        let gain = if wandered { WANDERED_GAIN } else { SHEARED_GAIN };
+        let sheared = affine.is_some_and(|fit| fit.bend > SHEARED_BEND && fit.gain > gain);
         if asked && (bent || sheared) {
             let cautious = self.cautious_run(&start);
             // A pose that brings so much more together is right, whatever the residuals look like.
