@@ -80,7 +80,8 @@ pub struct RefineConfig {
     pub soft_points: usize,
     /// Whether to look for deformation, which makes exact alignment worthless ([`crate::Verdict::Deformed`]).
     /// Default true; clouds of more than `coarse_points` are exempt. Switch it off for small clouds that are known to
-    /// be rigid: of two partial views of one surface, it takes 2 in 100 for deformed (`docs/experiments.md`).
+    /// be rigid: of two sparse samplings of one shape it takes 2 in 100 for deformed, of small crops and single views up to one
+    /// in eight (`docs/experiments.md`).
     pub check_deformation: bool,
     /// What to answer then. Default: the start.
     pub deformed: Deformed,

@@ -17,14 +17,14 @@ use crate::{Deformed, Metric, RefineConfig, RefineError};
 
 /// Residuals count as deformation when they correlate with those of their neighbours in the same cloud by more than the first
 /// number, and along the normals with those of their neighbours in the other cloud by more than the second. Each test alone takes
-/// partial views for bent ones; together they leave 98 in 100 of the rigid pairs alone, and find nearly all bends that a
-/// refinement would follow (`docs/experiments.md`).
-const DEFORMED_NEAR: f64 = 0.15;
-const DEFORMED_ACROSS: f64 = 0.09;
+/// partial views for bent ones (`docs/experiments.md`). Where the start is no worse an answer than a halfway pose, the numbers are
+/// lower: strong bends have little structure left within reach of a match.
+const DEFORMED_START: (f64, f64) = (0.13, 0.04);
+const DEFORMED_HALFWAY: (f64, f64) = (0.15, 0.09);
 /// So does an affine map that moves the points by more than this, in point spacings, away from any rigid motion, and has more
 /// support than the pose by more than the second number. Partial views of rigid shapes gain less (`docs/experiments.md`).
 const SHEARED_BEND: f64 = 0.75;
-const SHEARED_GAIN: f64 = 0.05;
+const SHEARED_GAIN: f64 = 0.03;
 /// Where the refinement turns by more than the first number away from the start of a method that knows shapes, a gain of the second is
 /// enough: a sheared box fits as well in a wrong pose as a noisy one in the right one, but where a turn repairs the start, no affine
 /// map is better.
@@ -146,7 +146,8 @@ impl Run<'_> {
         // Neighbours in large clouds sample one smooth surface: their residuals always hang together.
         let small = !self.source.has_coarse() && !self.target.has_coarse();
         let asked = self.config.check_deformation && small && residuals.median > COINCIDENT;
-        let bent = residuals.correlation > DEFORMED_NEAR && residuals.across_correlation > DEFORMED_ACROSS;
+        let (near, across) = if knows_shapes { DEFORMED_START } else { DEFORMED_HALFWAY };
+        let bent = residuals.correlation > near && residuals.across_correlation > across;
         let affine = (asked && knows_shapes && !bent)
             .then(|| affine_fit(self.source.coarse(), self.target.coarse(), &stage.pose, support));
         let gain = if wandered { WANDERED_GAIN } else { SHEARED_GAIN };

@@ -72,8 +72,9 @@ fn main() {
     reliability(held_out.iter().map(|(_, e)| (e.probability, e.right)));
     println!("the new file, on the held-out pairs:");
     reliability(held_out.iter().map(|(_, e)| (model.probability(&e.features), e.right)));
+    println!("the new file, by kind, on all pairs:");
     println!(
-        "\n| pairs | right | mean probability | abstained | right of the others | right of the abstained |"
+        "| pairs | right | mean probability | abstained | right of the others | right of the abstained |"
     );
     println!("|---|---|---|---|---|---|");
     let mut rows: Vec<&str> = examples.iter().map(|e| e.row.as_str()).collect();
