@@ -32,12 +32,13 @@ impl Metric {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Deformed {
-    /// The first start that agrees with the best one, as it was given: never worse than a learned method, which
-    /// knows shapes. So a pair that an affine map fits better than the refined pose ([`crate::AffineFit`]) counts as deformed, too, most of
-    /// all where that pose is turned by more than 20 degrees away from its start, unless half of the matches coincide.
+    /// The first start, as it was given: never worse than a learned method that is named first, which knows shapes. So a pair that
+    /// an affine map fits better than the refined pose ([`crate::AffineFit`]) counts as deformed, too, most of all where that pose is
+    /// turned by more than 20 degrees away from its start, unless half of the matches coincide.
     #[default]
     Start,
-    /// Halfway from that start to where point to point leads, for starts that know no shapes and may be far off.
+    /// Halfway from the first start that agrees with the best supported one to where point to point leads, for starts that know no
+    /// shapes and may be far off.
     Halfway,
 }
 
@@ -83,7 +84,7 @@ pub struct RefineConfig {
     /// be rigid: of two sparse samplings of one shape it takes 2 in 100 for deformed, of small crops and single views up to one
     /// in eight (`docs/experiments.md`).
     pub check_deformation: bool,
-    /// What to answer then. Default: the start.
+    /// What to answer then. Default: the first start.
     pub deformed: Deformed,
 }
 

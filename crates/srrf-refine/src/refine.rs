@@ -83,7 +83,7 @@ pub struct StartSupport {
 pub struct Refinement {
     /// The answer: `target ~ R source + t`.
     pub target_from_source: Rigid,
-    /// Name of the start that won.
+    /// Name of the start that the answer comes from: the best supported one, but where the clouds look deformed.
     pub start: String,
     /// Whether the answer is a refined pose (`true`) or a start as it was given.
     pub kept: bool,
@@ -138,7 +138,7 @@ impl Run<'_> {
         let mut stage = self.full_run(&to_local(&best.target_from_source, self.source, self.target));
         let residuals = residual_structure(self.source.coarse(), self.target.coarse(), &stage.pose);
         let mut verdict = Verdict::Rigid;
-        let mut kept = best.given;
+        let mut from = best;
         let mut support = self.support(&stage.pose);
         let knows_shapes = self.config.deformed == Deformed::Start;
         let wandered = knows_shapes
@@ -158,10 +158,15 @@ impl Run<'_> {
             if wandered || sheared || support < self.support(&cautious.pose) + CLEARLY_BETTER {
                 verdict = Verdict::Deformed;
                 let near = |s: &&StartSupport| s.given.angle_to_deg(&best.given) < SAME_DEG;
-                kept = starts.iter().find(near).unwrap_or(best).given;
+                from = match self.config.deformed {
+                    // No support tells the starts apart where the clouds are bent.
+                    Deformed::Start => &starts[0],
+                    Deformed::Halfway => starts.iter().find(near).unwrap_or(best),
+                };
+                let given = to_local(&from.given, self.source, self.target);
                 stage = match self.config.deformed {
-                    Deformed::Start => Stage { pose: to_local(&kept, self.source, self.target), ..cautious },
-                    Deformed::Halfway => halfway(&to_local(&kept, self.source, self.target), &cautious),
+                    Deformed::Start => Stage { pose: given, ..cautious },
+                    Deformed::Halfway => halfway(&given, &cautious),
                 };
                 support = self.support(&stage.pose);
             }
@@ -173,14 +178,14 @@ impl Run<'_> {
             support = unrefined;
         }
         let answer = match verdict {
-            Verdict::Unsupported => kept,
-            Verdict::Deformed if self.config.deformed == Deformed::Start => kept,
+            Verdict::Unsupported => from.given,
+            Verdict::Deformed if self.config.deformed == Deformed::Start => from.given,
             _ => to_global(&stage.pose, self.source, self.target),
         };
         Ok(Refinement {
             target_from_source: answer,
-            start: best.name.clone(),
-            kept: answer != kept,
+            start: from.name.clone(),
+            kept: answer != from.given,
             verdict,
             converged: stage.converged,
             iterations: stage.iterations,
