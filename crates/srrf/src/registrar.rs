@@ -15,8 +15,19 @@ use crate::probability::{Features, Logistic};
 use crate::search::{Search, Start};
 use crate::starts::{cube_rotations, turned};
 
-/// With this probability after the first round of starts, no second one is made.
+/// With this probability after a round of starts, no other one is made.
 const SURE: f64 = 0.9;
+/// Poses of FPFH with RANSAC that are starts of the first round.
+const FIRST: usize = 4;
+/// Poses that FPFH with RANSAC gives for each of its radii where there is doubt.
+const WIDE: usize = 48;
+/// Radii of the features that are tried then, in voxels, beside the default one. Of crops that keep 70 % of a shape a search with
+/// all three finds one in six more (`docs/scans.md`).
+const WIDE_RADII: [f64; 2] = [8.0, 12.0];
+
+/// With [`RotationRange::Within45`], poses that are turned by more than this against the given one are no starts: 45 degrees about
+/// each of three axes come to 86 at most.
+const WITHIN_DEG: f64 = 90.0;
 
 /// Why clouds could not be registered.
 #[derive(Debug, thiserror::Error)]
@@ -145,10 +156,15 @@ impl Registrar {
             }
             clock.lap("network");
         }
+        let mut doubtful: Vec<Start> = Vec::new();
         match self.options.method {
             Method::Auto | Method::FpfhRansac => {
-                match self.global(&centred.cloud, &target.centred.cloud) {
-                    Ok(poses) => starts.extend(poses),
+                let radius = FpfhRansacConfig::default().feature_voxels;
+                match self.global(&centred.cloud, &target.centred.cloud, radius, &given) {
+                    Ok(mut poses) => {
+                        doubtful = poses.split_off(FIRST.min(poses.len()));
+                        starts.extend(poses);
+                    }
                     Err(e) => warnings.push(format!("FPFH with RANSAC found no pose: {e}.")),
                 }
                 clock.lap("fpfh-ransac");
@@ -172,7 +188,20 @@ impl Registrar {
         let mut probability = self.probability(&best.features);
         clock.lap("refine");
 
-        // The second round, where the first left doubt: the network from all around.
+        // The second round, where the first left doubt: less likely poses of FPFH with RANSAC, and wider features.
+        if matches!(self.options.method, Method::Auto | Method::FpfhRansac) && probability < SURE {
+            let wide =
+                WIDE_RADII.map(|radius| self.global(&centred.cloud, &target.centred.cloud, radius, &given));
+            // What they do not find, the starts so far have to do without.
+            doubtful.extend(wide.into_iter().flatten().flatten());
+            clock.lap("fpfh-ransac, wider");
+            search.add(&doubtful).map_err(Error::Refine)?;
+            best = search.best().map_err(Error::Refine)?;
+            probability = self.probability(&best.features);
+            clock.lap("refine again");
+        }
+
+        // The third, where doubt remains: the network from all around.
         if let Some(net) = &self.network
             && self.options.rotation == RotationRange::Any
             && probability < SURE
@@ -228,11 +257,26 @@ impl Registrar {
         if known { fitted } else { fitted.min(features.fitness().powi(2)) }
     }
 
-    /// What RANSAC found, best first.
-    fn global(&self, source: &PointCloud, target: &PointCloud) -> Result<Vec<Start>, RegisterError> {
-        let config = FpfhRansacConfig { seed: self.options.seed, ..FpfhRansacConfig::default() };
+    /// What RANSAC found with features of this radius (in voxels), best first, as far as the options allow such turns against the
+    /// given pose.
+    fn global(
+        &self,
+        source: &PointCloud,
+        target: &PointCloud,
+        radius: f64,
+        given: &Rigid,
+    ) -> Result<Vec<Start>, RegisterError> {
+        let config = FpfhRansacConfig {
+            seed: self.options.seed,
+            feature_voxels: radius,
+            hypotheses: WIDE,
+            ..FpfhRansacConfig::default()
+        };
         let found = FpfhRansac::new(config).hypotheses(source, target)?;
-        Ok(found.poses.into_iter().map(|pose| ("fpfh-ransac".to_owned(), pose)).collect())
+        let any = self.options.rotation == RotationRange::Any;
+        let possible = |pose: &Rigid| any || pose.angle_to_deg(given) <= WITHIN_DEG;
+        let poses = found.poses.into_iter().filter(possible);
+        Ok(poses.map(|pose| ("fpfh-ransac".to_owned(), pose)).collect())
     }
 
     fn coarse(&self, found: &Registration, source: &Centred, target: &Target) -> CoarsePose {

@@ -1,0 +1,42 @@
+//! Where there is no doubt, the first round of starts is the only one; where there is, others follow.
+#![allow(clippy::unwrap_used, reason = "what fails here fails the test")]
+
+mod common;
+
+use nalgebra::Vector3;
+use srrf::{Method, Options, Outcome, Registrar};
+use srrf_cloud::{EulerXyz, PointCloud, Rigid};
+
+const WIDER: &str = "fpfh-ransac, wider";
+
+fn stages(found: &Outcome) -> Vec<&str> {
+    found.times.iter().map(|time| time.stage).collect()
+}
+
+/// The part of a cloud below a height of a direction.
+fn below(cloud: &PointCloud, direction: Vector3<f64>, height: f64) -> PointCloud {
+    let kept = |p: &&[f64; 3]| Vector3::from(**p).dot(&direction) < height;
+    PointCloud::new(cloud.points().iter().filter(kept).copied().collect()).unwrap()
+}
+
+#[test]
+fn doubt_asks_for_more_starts() {
+    let shape = common::shape(1500);
+    let truth = Rigid {
+        rotation: EulerXyz::from_deg([40.0, -70.0, 130.0]).to_matrix(),
+        translation: Vector3::new(0.3, -0.2, 0.1),
+    };
+    let registrar = Registrar::new(Options { method: Method::FpfhRansac, ..Options::default() }).unwrap();
+
+    let sure = registrar.register(&shape, &shape.transformed(&truth)).unwrap();
+    assert!(sure.probability > 0.9, "{}", sure.probability);
+    assert!(!stages(&sure).contains(&WIDER), "{:?}", stages(&sure));
+    assert!(sure.refinement.unwrap().starts.len() <= 4);
+
+    // What is left of one cloud is hardly in the other.
+    let (one, other) = (below(&shape, Vector3::x(), -0.05), below(&shape, -Vector3::x(), 0.1));
+    let doubtful = registrar.register(&one, &other.transformed(&truth)).unwrap();
+    assert!(doubtful.probability < 0.9, "{}", doubtful.probability);
+    assert!(stages(&doubtful).contains(&WIDER), "{:?}", stages(&doubtful));
+    assert!(doubtful.refinement.unwrap().starts.len() > 20);
+}
