@@ -23,6 +23,10 @@ pub enum InlierTest {
     /// As [`InlierTest::Nearest`], from both sides: the mean of the shares of source points near the target
     /// and of target points near the source.
     BothWays,
+    /// The paper's words for both poses with one set of correspondences, the dense branch's. They favour the dense pose, which
+    /// was fitted to them: where the skeleton's makes more of them inliers, outliers have drawn the fit away. The
+    /// threshold is `dense_threshold`.
+    Common,
 }
 
 /// How the two poses are blended.
@@ -41,6 +45,11 @@ pub struct IntegrationConfig {
     /// fit about as well, the dense branch's is the better one more often. Default and the paper: 1.
     #[serde(default = "defaults::one", skip_serializing_if = "defaults::is_one")]
     pub skeleton_weight: f64,
+    /// With [`InlierTest::Common`]: lambda is 0 where the skeleton branch is ahead by more than so many standard errors, and 1 elsewhere
+    /// (McNemar 1947: of the correspondences that are inliers of one pose alone, `n_s` and `n_c`, that is
+    /// `n_s - n_c > z sqrt(n_s + n_c)`). Default: none, lambda weighs the ratios.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub standard_errors: Option<f64>,
 }
 
 /// The fused pose and what it was made from.
@@ -83,14 +92,35 @@ impl IntegrationConfig {
         source: &Tensor<3>,
         target: &Tensor<3>,
     ) -> Fusion {
-        let dense_inlier_ratio = self.inlier_ratio(&dense, self.dense_threshold, source, target);
-        let skeleton_inlier_ratio = self.inlier_ratio(&skeleton, self.skeleton_threshold, source, target);
-        let lambda: Vec<f64> = dense_inlier_ratio
-            .iter()
-            .zip(&skeleton_inlier_ratio)
-            .map(|(c, s)| (c.powf(self.sharpness), (self.skeleton_weight * s).powf(self.sharpness)))
-            .map(|(c, s)| if c + s > 0.0 { c / (c + s) } else { 0.5 })
-            .collect();
+        let near = |branch: &BranchPose<'_>, threshold| self.near(branch, threshold, source, target);
+        let (dense_inlier_ratio, skeleton_inlier_ratio, ahead) = match self.test {
+            InlierTest::SoftMatch => {
+                let (c, s) = (
+                    agreeing(&dense, &dense, self.dense_threshold),
+                    agreeing(&skeleton, &skeleton, self.skeleton_threshold),
+                );
+                (shares(&c), shares(&s), None)
+            }
+            InlierTest::Common => {
+                let (c, s) = (
+                    agreeing(&dense, &dense, self.dense_threshold),
+                    agreeing(&dense, &skeleton, self.dense_threshold),
+                );
+                (shares(&c), shares(&s), Some(standard_errors_ahead(&s, &c)))
+            }
+            InlierTest::Nearest | InlierTest::BothWays => {
+                (near(&dense, self.dense_threshold), near(&skeleton, self.skeleton_threshold), None)
+            }
+        };
+        let lambda: Vec<f64> = match (self.standard_errors, ahead) {
+            (Some(least), Some(ahead)) => ahead.iter().map(|z| if *z > least { 0.0 } else { 1.0 }).collect(),
+            _ => dense_inlier_ratio
+                .iter()
+                .zip(&skeleton_inlier_ratio)
+                .map(|(c, s)| (c.powf(self.sharpness), (self.skeleton_weight * s).powf(self.sharpness)))
+                .map(|(c, s)| if c + s > 0.0 { c / (c + s) } else { 0.5 })
+                .collect(),
+        };
 
         let device = source.device().without_autodiff();
         let weights = TensorData::new(lambda.clone(), [lambda.len(), 1]);
@@ -106,38 +136,60 @@ impl IntegrationConfig {
         Fusion { rotation, translation, dense_inlier_ratio, skeleton_inlier_ratio, lambda }
     }
 
-    /// `gamma = N_inlier / N` of each pair.
-    fn inlier_ratio(
+    /// `gamma = N_inlier / N` of each pair: the share of the source points that the pose brings near the target, or the mean
+    /// of that and the share of target points with a source point near.
+    fn near(
         &self,
-        branch: &BranchPose<'_>,
+        pose: &BranchPose<'_>,
         threshold: f64,
         source: &Tensor<3>,
         target: &Tensor<3>,
     ) -> Vec<f64> {
-        let (rotation, translation) = (branch.rotation.clone().detach(), branch.translation.clone().detach());
-        match self.test {
-            InlierTest::SoftMatch => {
-                let moved =
-                    HostClouds::read(&transform(branch.points.clone().detach(), rotation, translation));
-                let matches = HostClouds::read(&branch.matches.clone().detach());
-                let near = |a: &[f32; 3], b: &[f32; 3]| {
-                    (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>() < threshold * threshold
-                };
-                let count =
-                    |a: &[[f32; 3]], b: &[[f32; 3]]| a.iter().zip(b).filter(|(a, b)| near(a, b)).count();
-                moved.iter().zip(matches.iter()).map(|(a, b)| count(a, b) as f64 / a.len() as f64).collect()
-            }
-            InlierTest::Nearest | InlierTest::BothWays => {
-                let moved = HostClouds::read(&transform(source.clone().detach(), rotation, translation));
-                let target = HostClouds::read(target);
-                let clouds: Vec<_> = moved.iter().zip(target.iter()).collect();
-                let share = |a, b| share_within(a, b, threshold as f32);
-                let ratio = |(a, b): &(_, _)| match self.test {
-                    InlierTest::BothWays => 0.5 * (share(*a, *b) + share(*b, *a)),
-                    _ => share(*a, *b),
-                };
-                clouds.par_iter().map(ratio).collect()
-            }
-        }
+        let moved = pose.host_clouds(source);
+        let target = HostClouds::read(target);
+        let clouds: Vec<_> = moved.iter().zip(target.iter()).collect();
+        let share = |a, b| share_within(a, b, threshold as f32);
+        let ratio = |(a, b): &(_, _)| match self.test {
+            InlierTest::BothWays => 0.5 * (share(*a, *b) + share(*b, *a)),
+            _ => share(*a, *b),
+        };
+        clouds.par_iter().map(ratio).collect()
     }
+}
+
+impl BranchPose<'_> {
+    /// `points` moved by the pose.
+    fn host_clouds(&self, points: &Tensor<3>) -> HostClouds {
+        let (rotation, translation) = (self.rotation.clone().detach(), self.translation.clone().detach());
+        HostClouds::read(&transform(points.clone().detach(), rotation, translation))
+    }
+}
+
+/// Of each correspondence of a branch, whether it agrees with a pose: `|R x_i + t - yhat_i| < threshold`.
+fn agreeing(branch: &BranchPose<'_>, pose: &BranchPose<'_>, threshold: f64) -> Vec<Vec<bool>> {
+    let moved = pose.host_clouds(branch.points);
+    let matches = HostClouds::read(&branch.matches.clone().detach());
+    let near = |(a, b): (&[f32; 3], &[f32; 3])| {
+        (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>() < threshold * threshold
+    };
+    moved.iter().zip(matches.iter()).map(|(a, b)| a.iter().zip(b).map(near).collect()).collect()
+}
+
+/// The share of each pair's correspondences that agree.
+fn shares(agree: &[Vec<bool>]) -> Vec<f64> {
+    agree.iter().map(|a| a.iter().filter(|near| **near).count() as f64 / a.len() as f64).collect()
+}
+
+/// McNemar's statistic, pair by pair: of the correspondences that agree with one pose alone, by how many standard errors more
+/// agree with the first one.
+fn standard_errors_ahead(first: &[Vec<bool>], second: &[Vec<bool>]) -> Vec<f64> {
+    let of_pair = |(a, b): (&Vec<bool>, &Vec<bool>)| {
+        let (mut gained, mut lost) = (0.0, 0.0);
+        for (a, b) in a.iter().zip(b) {
+            gained += f64::from(u8::from(*a && !*b));
+            lost += f64::from(u8::from(*b && !*a));
+        }
+        if gained + lost > 0.0 { (gained - lost) / f64::sqrt(gained + lost) } else { 0.0 }
+    };
+    first.iter().zip(second).map(of_pair).collect()
 }

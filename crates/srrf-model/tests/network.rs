@@ -199,6 +199,31 @@ fn lambda_weighs_the_inlier_ratios() {
 }
 
 #[test]
+fn common_correspondences_judge_both_poses() {
+    let mut numbers = Numbers(11);
+    let config = IntegrationConfig { test: InlierTest::Common, ..tiny().integration };
+    let three = IntegrationConfig { standard_errors: Some(3.0), ..config.clone() };
+    let cloud = numbers.many(21);
+    let (a, b) = (drawn(45.0, &mut numbers), drawn(45.0, &mut numbers));
+    // The skeleton branch's pose explains 9 or 10 of the 12 matches, the dense branch's own pose one of the others.
+    for (explained, lambda) in [(9, 1.0), (10, 0.0)] {
+        let mut dense = claim(b, explained, 12, &mut numbers);
+        dense.pose = a;
+        let last = [dense.points[33], dense.points[34], dense.points[35]];
+        dense.matches[33..].copy_from_slice(&a.apply(&last));
+        let skeleton = claim(b, 7, 7, &mut numbers); // its own matches play no part
+        let fusion = fuse(&config, &dense, &skeleton, &cloud, &cloud);
+        assert_eq!(fusion.dense_inlier_ratio, [1.0 / 12.0]);
+        assert_eq!(fusion.skeleton_inlier_ratio, [explained as f64 / 12.0]);
+        assert!((fusion.lambda[0] - 1.0 / (1.0 + explained as f64)).abs() < 1e-12);
+        // (9 - 1) / sqrt(10) is 2.53 and (10 - 1) / sqrt(11) is 2.71: below 3, and on two sides of 2.6.
+        assert_eq!(fuse(&three, &dense, &skeleton, &cloud, &cloud).lambda, [1.0]);
+        let between = IntegrationConfig { standard_errors: Some(2.6), ..config.clone() };
+        assert_eq!(fuse(&between, &dense, &skeleton, &cloud, &cloud).lambda, [lambda]);
+    }
+}
+
+#[test]
 fn poses_that_agree_are_kept_and_opposite_ones_stay_rotations() {
     let mut numbers = Numbers(9);
     let config = tiny().integration;

@@ -50,6 +50,7 @@ fn config() -> SrrfConfig {
             skeleton_threshold: 0.05,
             sharpness: 1.0,
             skeleton_weight: 1.0,
+            standard_errors: None,
         },
         inference: InferenceConfig::default(),
     }

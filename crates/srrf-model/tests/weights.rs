@@ -151,7 +151,7 @@ fn files_of_other_programs_are_named() {
     assert!(said(&unknown).contains("encoder"));
     // Sizes that no network can have are found before one is built.
     type Change = fn(&mut SrrfConfig);
-    let changes: [(&str, Change); 9] = [
+    let changes: [(&str, Change); 10] = [
         ("dense.sfe.heads", |c| c.dense.sfe.heads = 0),
         ("skeleton.pfi.heads", |c| c.skeleton.pfi.heads = 7),
         ("skeleton.sfe", |c| c.skeleton.sfe.layers = 0),
@@ -161,6 +161,7 @@ fn files_of_other_programs_are_named() {
         ("inference.passes", |c| c.inference.passes = 0),
         ("inference.prior", |c| c.inference.prior = Some(0.0)),
         ("integration.skeleton_weight", |c| c.integration.skeleton_weight = -1.0),
+        ("integration.standard_errors", |c| c.integration.standard_errors = Some(3.0)),
     ];
     for (key, change) in changes {
         let impossible = rewritten(|_, header| {

@@ -9,7 +9,7 @@
 use std::path::PathBuf;
 
 use clap::Parser;
-use srrf_cloud::{KnnIndex, Register, Rigid};
+use srrf_cloud::{KnnIndex, Register, Rigid, SoftMatch};
 use srrf_corrupt::{CorruptionKind, Pair, Severity};
 use srrf_eval::{PairError, Scores};
 use srrf_model::{PairFrame, SrrfRegister, device, embedded, keep_freed_memory};
@@ -49,6 +49,8 @@ struct Judged {
     near: [[f64; 3]; THRESHOLDS.len()],
     /// Points of both clouds.
     points: f64,
+    /// Of each threshold: matches of the dense branch that agree with the dense pose alone, with the skeleton's alone, and with both.
+    matches: [[f64; 3]; THRESHOLDS.len()],
 }
 
 /// The branches and the fused pose.
@@ -65,10 +67,29 @@ fn judge(method: &SrrfRegister, pair: &Pair) -> Option<Judged> {
     let (dense, skeleton) = (branch(0)?, branch(1)?);
     let scale = PairFrame::new(&pair.source, &pair.target).undo_length(1.0);
     let (by_dense, by_skeleton) = (distances(pair, &dense)?, distances(pair, &skeleton)?);
-    let near = THRESHOLDS.map(|threshold| {
+    let residuals = |pose: &Rigid| -> Vec<f64> {
+        let off =
+            |m: &SoftMatch| (0..3).map(|c| (pose.apply(&m.source)[c] - m.target[c]).powi(2)).sum::<f64>();
+        answer.matches.iter().map(|m| off(m).sqrt()).collect()
+    };
+    let near = counts(&by_dense, &by_skeleton, scale);
+    let matches = counts(&residuals(&dense), &residuals(&skeleton), scale);
+    let error = |pose: &Rigid| PairError::new(Some(pose), &pair.target_from_source);
+    Some(Judged {
+        corruption: pair.corruption,
+        errors: [error(&dense), error(&skeleton), error(&answer.target_from_source)],
+        near,
+        points: (pair.source.len() + pair.target.len()) as f64,
+        matches,
+    })
+}
+
+/// For each threshold, how many distances are below it with the first pose alone, with the second alone, and with both.
+fn counts(first: &[f64], second: &[f64], scale: f64) -> [[f64; 3]; THRESHOLDS.len()] {
+    THRESHOLDS.map(|threshold| {
         let mut counts = [0.0; 3];
-        for (dense, skeleton) in by_dense.iter().zip(&by_skeleton) {
-            match (*dense < threshold * scale, *skeleton < threshold * scale) {
+        for (a, b) in first.iter().zip(second) {
+            match (*a < threshold * scale, *b < threshold * scale) {
                 (true, false) => counts[0] += 1.0,
                 (false, true) => counts[1] += 1.0,
                 (true, true) => counts[2] += 1.0,
@@ -76,13 +97,6 @@ fn judge(method: &SrrfRegister, pair: &Pair) -> Option<Judged> {
             }
         }
         counts
-    });
-    let error = |pose: &Rigid| PairError::new(Some(pose), &pair.target_from_source);
-    Some(Judged {
-        corruption: pair.corruption,
-        errors: [error(&dense), error(&skeleton), error(&answer.target_from_source)],
-        near,
-        points: (pair.source.len() + pair.target.len()) as f64,
     })
 }
 
@@ -156,12 +170,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (t, threshold) in THRESHOLDS.iter().enumerate() {
         let threshold = &threshold.to_string();
         for weight in WEIGHTS {
+            print(&format!("matches of the dense branch, skeleton times {weight}"), threshold, &|pair| {
+                let [dense, skeleton, both] = pair.matches[t];
+                choice(weight * (skeleton + both) > dense + both)
+            })?;
             print(&format!("skeleton times {weight}"), threshold, &|pair| {
                 let [dense, skeleton, both] = pair.near[t];
                 choice(weight * (skeleton + both) > dense + both)
             })?;
         }
         for ahead in STANDARD_ERRORS {
+            print(
+                &format!("matches of the dense branch, ahead by {ahead} standard errors"),
+                threshold,
+                &|pair| {
+                    let [dense, skeleton, _] = pair.matches[t];
+                    choice(skeleton - dense > ahead * (skeleton + dense).sqrt())
+                },
+            )?;
             print(&format!("ahead by {ahead} standard errors, points independent"), threshold, &|pair| {
                 let [dense, skeleton, both] = pair.near[t].map(|count| count / pair.points);
                 let variance = |share: f64| share * (1.0 - share) / pair.points;

@@ -165,8 +165,14 @@ impl Row {
         prior: Option<f64>,
     ) -> Self {
         let inference = InferenceConfig { passes, last_tokens: Some(last_tokens), last_matches, prior };
-        let integration =
-            IntegrationConfig { test, dense_threshold, skeleton_threshold, sharpness, skeleton_weight };
+        let integration = IntegrationConfig {
+            test,
+            dense_threshold,
+            skeleton_threshold,
+            sharpness,
+            skeleton_weight,
+            standard_errors: None,
+        };
         Self { tokens, inference, integration }
     }
 
@@ -196,14 +202,21 @@ impl Row {
 
     fn describe(&self) -> String {
         let InferenceConfig { passes, last_tokens, last_matches, prior } = &self.inference;
-        let IntegrationConfig { test, dense_threshold, skeleton_threshold, sharpness, skeleton_weight } =
-            &self.integration;
+        let IntegrationConfig {
+            test,
+            dense_threshold,
+            skeleton_threshold,
+            sharpness,
+            skeleton_weight,
+            standard_errors,
+        } = &self.integration;
+        let ahead = standard_errors.map(|z| format!(", ahead by {z} standard errors")).unwrap_or_default();
         let less = if *skeleton_weight < 1.0 { format!(", times {skeleton_weight}") } else { String::new() };
         let near = prior.map(|deviation| format!(", prior {deviation}")).unwrap_or_default();
         let (tokens, last_tokens) = (self.tokens, last_tokens.unwrap_or(self.tokens));
         format!(
             "{passes} | {tokens} | {last_tokens} {last_matches:?}{near} | {test:?} {dense_threshold} \
-             {skeleton_threshold}{less} | {sharpness}"
+             {skeleton_threshold}{less}{ahead} | {sharpness}"
         )
     }
 }

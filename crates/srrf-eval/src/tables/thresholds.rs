@@ -64,6 +64,7 @@ pub(crate) fn methods(context: &MethodContext) -> Result<Vec<(&'static [&'static
             skeleton_threshold: skeleton,
             sharpness,
             skeleton_weight: 1.0,
+            standard_errors: None,
         };
         let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
         let method = Method {

@@ -108,6 +108,7 @@ pub fn tiny() -> SrrfConfig {
             skeleton_threshold: 0.1,
             sharpness: 1.0,
             skeleton_weight: 1.0,
+            standard_errors: None,
         },
         inference: InferenceConfig::default(),
     }
