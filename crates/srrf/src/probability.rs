@@ -6,6 +6,9 @@ use serde_json::{Value, json};
 use srrf_cloud::Rigid;
 use srrf_refine::{Evidence, Refinement, Verdict};
 
+/// Starts with so much of the best one's support have a say in whether others agree. However many poor starts are tried, they have none.
+const WELL_SUPPORTED: f64 = 0.9;
+
 /// Number of features.
 pub const FEATURES: usize = 9;
 
@@ -38,7 +41,10 @@ impl Features {
         let support = refinement.map_or(evidence.fitness, |r| r.support);
         let apart = |other: &Rigid| pose.angle_to_deg(other) > 5.0;
         let rival = rivals.iter().filter(|(p, _)| apart(p)).map(|(_, s)| *s).fold(0.0, f64::max);
-        let agreeing = rivals.iter().filter(|(p, _)| !apart(p)).count() as f64 / rivals.len().max(1) as f64;
+        let best = rivals.iter().map(|(_, s)| *s).fold(0.0, f64::max);
+        let with_a_say: Vec<_> = rivals.iter().filter(|(_, s)| *s >= WELL_SUPPORTED * best).collect();
+        let agreeing =
+            with_a_say.iter().filter(|(p, _)| !apart(p)).count() as f64 / with_a_say.len().max(1) as f64;
         let spacing = evidence.spacing.max(f64::MIN_POSITIVE);
         Self([
             evidence.fitness,
@@ -191,6 +197,38 @@ mod tests {
         let share = examples.iter().filter(|(_, r)| *r).count() as f64 / 2000.0;
         assert!((mean - share).abs() < 0.01);
         assert!(Logistic::fit(&examples[..0], 1.0, String::new()).is_none());
+    }
+
+    #[test]
+    fn poor_starts_have_no_say() {
+        let evidence = Evidence {
+            spacing: 0.1,
+            inlier_threshold: 0.1,
+            inliers: 50,
+            source_points: 100,
+            target_points: 100,
+            fitness: 0.5,
+            overlap_target: 0.5,
+            inlier_rmse: 0.05,
+            information: nalgebra::Matrix6::identity(),
+            information_centre: nalgebra::Vector3::zeros(),
+        };
+        let turned = |degrees: f64| Rigid {
+            rotation: *nalgebra::Rotation3::from_scaled_axis(nalgebra::Vector3::x() * degrees.to_radians())
+                .matrix(),
+            ..Rigid::identity()
+        };
+        let agreeing = |rivals: &[(Rigid, f64)]| {
+            Features::new(&evidence, None, &turned(0.0), rivals).to_json()["agreeing_starts"]
+                .as_f64()
+                .unwrap()
+        };
+        let mut rivals =
+            vec![(turned(0.0), 0.50), (turned(3.0), 0.48), (turned(90.0), 0.46), (turned(1.0), 0.40)];
+        assert!((agreeing(&rivals) - 2.0 / 3.0).abs() < 1e-12);
+        rivals.extend((0..100).map(|i| (turned(f64::from(i) + 20.0), 0.3)));
+        assert!((agreeing(&rivals) - 2.0 / 3.0).abs() < 1e-12);
+        assert_eq!(agreeing(&[]), 0.0);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use nalgebra::Matrix3;
 use rayon::prelude::*;
 use srrf_baselines::{FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, Skeletons};
@@ -12,7 +13,7 @@ use crate::network::{Network, thinned};
 use crate::options::{Method, Options, RotationRange};
 use crate::outcome::{CoarsePose, Outcome, PointCounts, StageTime};
 use crate::probability::{Features, Logistic};
-use crate::search::{Search, Start};
+use crate::search::{Found, Search, Start};
 use crate::starts::{cube_rotations, turned};
 
 /// With this probability after a round of starts, no other one is made.
@@ -160,7 +161,7 @@ impl Registrar {
         match self.options.method {
             Method::Auto | Method::FpfhRansac => {
                 let radius = FpfhRansacConfig::default().feature_voxels;
-                match self.global(&centred.cloud, &target.centred.cloud, radius, &given) {
+                match self.global(&centred, target, radius, &given) {
                     Ok(mut poses) => {
                         doubtful = poses.split_off(FIRST.min(poses.len()));
                         starts.extend(poses);
@@ -183,21 +184,16 @@ impl Registrar {
         if starts.is_empty() {
             return Err(Error::NoPose(warnings.join(" ")));
         }
-        search.add(&starts).map_err(Error::Refine)?;
-        let mut best = search.best().map_err(Error::Refine)?;
-        let mut probability = self.probability(&best.features);
+        let (mut best, mut probability) = self.best_with(&mut search, &starts)?;
         clock.lap("refine");
 
         // The second round, where the first left doubt: less likely poses of FPFH with RANSAC, and wider features.
         if matches!(self.options.method, Method::Auto | Method::FpfhRansac) && probability < SURE {
-            let wide =
-                WIDE_RADII.map(|radius| self.global(&centred.cloud, &target.centred.cloud, radius, &given));
+            let wide = WIDE_RADII.map(|radius| self.global(&centred, target, radius, &given));
             // What they do not find, the starts so far have to do without.
             doubtful.extend(wide.into_iter().flatten().flatten());
             clock.lap("fpfh-ransac, wider");
-            search.add(&doubtful).map_err(Error::Refine)?;
-            best = search.best().map_err(Error::Refine)?;
-            probability = self.probability(&best.features);
+            (best, probability) = self.best_with(&mut search, &doubtful)?;
             clock.lap("refine again");
         }
 
@@ -206,19 +202,9 @@ impl Registrar {
             && self.options.rotation == RotationRange::Any
             && probability < SURE
         {
-            let found: Vec<Start> = cube_rotations()[1..]
-                .par_iter()
-                .enumerate()
-                .filter_map(|(i, rotation)| {
-                    let start = turned(given.rotation * rotation);
-                    let found = net.glance_from(&thin, &target.thin, &start).ok()?;
-                    Some((format!("network, orientation {}", i + 1), found.target_from_source))
-                })
-                .collect();
+            let found = all_around(net, &thin, &target.thin, &given);
             clock.lap("network, 23 orientations");
-            search.add(&found).map_err(Error::Refine)?;
-            best = search.best().map_err(Error::Refine)?;
-            probability = self.probability(&best.features);
+            (best, probability) = self.best_with(&mut search, &found)?;
             clock.lap("refine again");
         }
 
@@ -257,12 +243,20 @@ impl Registrar {
         if known { fitted } else { fitted.min(features.fitness().powi(2)) }
     }
 
+    /// The best start after one more round, refined, and its probability.
+    fn best_with(&self, search: &mut Search<'_>, starts: &[Start]) -> Result<(Found, f64), Error> {
+        search.add(starts).map_err(Error::Refine)?;
+        let best = search.best().map_err(Error::Refine)?;
+        let probability = self.probability(&best.features);
+        Ok((best, probability))
+    }
+
     /// What RANSAC found with features of this radius (in voxels), best first, as far as the options allow such turns against the
     /// given pose.
     fn global(
         &self,
-        source: &PointCloud,
-        target: &PointCloud,
+        source: &Centred,
+        target: &Target,
         radius: f64,
         given: &Rigid,
     ) -> Result<Vec<Start>, RegisterError> {
@@ -272,7 +266,7 @@ impl Registrar {
             hypotheses: WIDE,
             ..FpfhRansacConfig::default()
         };
-        let found = FpfhRansac::new(config).hypotheses(source, target)?;
+        let found = FpfhRansac::new(config).hypotheses(&source.cloud, &target.centred.cloud)?;
         let any = self.options.rotation == RotationRange::Any;
         let possible = |pose: &Rigid| any || pose.angle_to_deg(given) <= WITHIN_DEG;
         let poses = found.poses.into_iter().filter(possible);
@@ -310,6 +304,16 @@ fn poses_of(found: &Registration, name: &str) -> Vec<Start> {
     let mut poses = vec![(format!("{name} fused"), found.target_from_source)];
     poses.extend(found.branches.iter().map(|b| (format!("{name} {}", b.name), b.target_from_source)));
     poses
+}
+
+/// What the network sees of the source in the other 23 orientations of a cube.
+fn all_around(net: &Network, source: &PointCloud, target: &PointCloud, given: &Rigid) -> Vec<Start> {
+    let look = |(i, rotation): (usize, &Matrix3<f64>)| {
+        let start = turned(given.rotation * rotation);
+        let found = net.glance_from(source, target, &start).ok()?;
+        Some((format!("network, orientation {}", i + 1), found.target_from_source))
+    };
+    cube_rotations()[1..].par_iter().enumerate().filter_map(look).collect()
 }
 
 /// ICP, point to point, from a given pose.
