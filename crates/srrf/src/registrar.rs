@@ -22,8 +22,8 @@ const SURE: f64 = 0.9;
 const FIRST: usize = 4;
 /// Poses that FPFH with RANSAC gives for each of its radii where there is doubt.
 const WIDE: usize = 48;
-/// Radii of the features that are tried then, in voxels, beside the default one. Of crops that keep 70 % of a shape a search with
-/// all three finds one in six more (`docs/scans.md`).
+/// Radii of the features that are tried then, in voxels, beside the default one: on crops and uneven clouds each finds poses that
+/// the others miss (`docs/scans.md`).
 const WIDE_RADII: [f64; 2] = [8.0, 12.0];
 
 /// With [`RotationRange::Within45`], poses that are turned by more than this against the given one are no starts: 45 degrees about
