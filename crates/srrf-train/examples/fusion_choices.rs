@@ -170,23 +170,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (t, threshold) in THRESHOLDS.iter().enumerate() {
         let threshold = &threshold.to_string();
         for weight in WEIGHTS {
+            let rule = |[dense, skeleton, both]: [f64; 3]| choice(weight * (skeleton + both) > dense + both);
             print(&format!("matches of the dense branch, skeleton times {weight}"), threshold, &|pair| {
-                let [dense, skeleton, both] = pair.matches[t];
-                choice(weight * (skeleton + both) > dense + both)
+                rule(pair.matches[t])
             })?;
-            print(&format!("skeleton times {weight}"), threshold, &|pair| {
-                let [dense, skeleton, both] = pair.near[t];
-                choice(weight * (skeleton + both) > dense + both)
-            })?;
+            print(&format!("skeleton times {weight}"), threshold, &|pair| rule(pair.near[t]))?;
         }
         for ahead in STANDARD_ERRORS {
+            let paired =
+                |[dense, skeleton, _]: [f64; 3]| choice(skeleton - dense > ahead * (skeleton + dense).sqrt());
             print(
                 &format!("matches of the dense branch, ahead by {ahead} standard errors"),
                 threshold,
-                &|pair| {
-                    let [dense, skeleton, _] = pair.matches[t];
-                    choice(skeleton - dense > ahead * (skeleton + dense).sqrt())
-                },
+                &|pair| paired(pair.matches[t]),
             )?;
             print(&format!("ahead by {ahead} standard errors, points independent"), threshold, &|pair| {
                 let [dense, skeleton, both] = pair.near[t].map(|count| count / pair.points);
@@ -195,8 +191,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 choice(skeleton - dense > ahead * error)
             })?;
             print(&format!("ahead by {ahead} standard errors, points paired"), threshold, &|pair| {
-                let [dense, skeleton, _] = pair.near[t];
-                choice(skeleton - dense > ahead * (skeleton + dense).sqrt())
+                paired(pair.near[t])
             })?;
         }
     }

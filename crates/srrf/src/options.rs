@@ -68,8 +68,8 @@ impl FromStr for Method {
 /// How far the clouds may be turned against each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum RotationRange {
-    /// By up to about 45 degrees about each axis, the range that the network was trained for. No start is turned by more than 90
-    /// degrees against the given pose.
+    /// By up to about 45 degrees about each axis, the range that the network was trained for. FPFH with RANSAC gives
+    /// no start that is turned by more than 90 degrees against the given pose.
     #[serde(rename = "45")]
     Within45,
     /// By anything: the network also sees the source in the 24 orientations of a cube.

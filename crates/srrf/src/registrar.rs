@@ -194,7 +194,7 @@ impl Registrar {
             doubtful.extend(wide.into_iter().flatten().flatten());
             clock.lap("fpfh-ransac, wider");
             (best, probability) = self.best_with(&mut search, &doubtful)?;
-            clock.lap("refine again");
+            clock.lap("refine, wider");
         }
 
         // The third, where doubt remains: the network from all around.
@@ -267,10 +267,11 @@ impl Registrar {
             ..FpfhRansacConfig::default()
         };
         let found = FpfhRansac::new(config).hypotheses(&source.cloud, &target.centred.cloud)?;
-        let any = self.options.rotation == RotationRange::Any;
-        let possible = |pose: &Rigid| any || pose.angle_to_deg(given) <= WITHIN_DEG;
-        let poses = found.poses.into_iter().filter(possible);
-        Ok(poses.map(|pose| ("fpfh-ransac".to_owned(), pose)).collect())
+        let poses = match self.options.rotation {
+            RotationRange::Any => found.poses,
+            RotationRange::Within45 => within(found.poses, given)?,
+        };
+        Ok(poses.into_iter().map(|pose| ("fpfh-ransac".to_owned(), pose)).collect())
     }
 
     fn coarse(&self, found: &Registration, source: &Centred, target: &Target) -> CoarsePose {
@@ -297,6 +298,19 @@ impl Registrar {
         let target_from_source = input(&found.target_from_source);
         CoarsePose { target_from_source, branches, lambda, skeletons, matches }
     }
+}
+
+/// The poses that are turned by at most [`WITHIN_DEG`] against the given one.
+fn within(poses: Vec<Rigid>, given: &Rigid) -> Result<Vec<Rigid>, RegisterError> {
+    let count = poses.len();
+    let kept: Vec<Rigid> = poses.into_iter().filter(|p| p.angle_to_deg(given) <= WITHIN_DEG).collect();
+    if kept.is_empty() {
+        return Err(RegisterError::NoPose(format!(
+            "each of {count} poses is turned by more than {WITHIN_DEG} degrees against the given one; the rotation range \
+             45 excludes them, 180 does not"
+        )));
+    }
+    Ok(kept)
 }
 
 /// The fused pose of the network and those of its branches.
@@ -336,5 +350,22 @@ impl Clock {
     fn lap(&mut self, stage: &'static str) {
         self.times.push(StageTime { stage, seconds: self.last.elapsed().as_secs_f64() });
         self.last = Instant::now();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use srrf_cloud::EulerXyz;
+
+    use super::*;
+
+    #[test]
+    fn poses_beyond_the_range_are_left_out_and_none_left_is_an_error() {
+        let about_z = |degrees| turned(EulerXyz::from_deg([0.0, 0.0, degrees]).to_matrix());
+        let given = about_z(30.0);
+        let poses = vec![about_z(160.0), about_z(119.0), about_z(-59.0), about_z(-61.0)];
+        assert_eq!(within(poses, &given).unwrap(), [about_z(119.0), about_z(-59.0)]);
+        let said = within(vec![about_z(160.0), about_z(-61.0)], &given).unwrap_err().to_string();
+        assert!(said.contains("each of 2 poses") && said.contains("180"), "{said}");
     }
 }
