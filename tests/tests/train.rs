@@ -149,6 +149,7 @@ fn bad_configurations_are_refused_by_key() {
         ("clean = 0.1", "clean = 1.5", &["bad.toml", "draw.clean", "between 0 and 1"][..]),
         ("epochs = 2.4", "epochs = -1", &["bad.toml", "stages[2].epochs"][..]),
         ("heads = 2, mlp", "heads = 3, mlp", &["bad.toml", "sfe.heads", "divide"][..]),
+        ("seed = 3", "seed = 3\nreduce = \"collective\"", &["reduce", "cuda only", "`flex`", "ordered"][..]),
         ("kind = \"adam\"", "kind = \"lion\"", &["bad.toml", "unknown variant `lion`"][..]),
     ] {
         assert!(text.contains(from), "{from}");

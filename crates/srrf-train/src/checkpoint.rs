@@ -139,9 +139,10 @@ pub fn load<C: Trained>(
     let mut saved: serde_json::Value =
         serde_json::from_str(entry("config")?).map_err(|e| broken(e.to_string()))?;
     let mut wanted = serde_json::to_value(config).map_err(|e| broken(e.to_string()))?;
-    // A run may go on on another device.
+    // A run may go on on other devices.
     for config in [&mut saved, &mut wanted].into_iter().filter_map(|config| config.as_object_mut()) {
         config.remove("device");
+        config.remove("reduce");
     }
     if let Some(key) = first_difference(&saved, &wanted, String::new()) {
         return Err(CheckpointError::OtherConfig { path, why: format!("`{key}` differs") });

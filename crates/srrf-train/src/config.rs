@@ -62,6 +62,9 @@ pub struct TrainConfig<C: Trained = SrrfConfig> {
     /// turn to the devices of a list, `cuda:0,cuda:1`. A run may go on on others.
     #[serde(default)]
     pub device: Option<String>,
+    /// How the gradients of several devices come together. A run may go on with another.
+    #[serde(default, skip_serializing_if = "Reduce::is_ordered")]
+    pub reduce: Reduce,
     /// The shapes.
     pub data: DataConfig,
     /// How pairs are drawn.
@@ -80,6 +83,24 @@ pub struct TrainConfig<C: Trained = SrrfConfig> {
     /// Validation and checkpoints.
     #[serde(default)]
     pub keep: KeepConfig,
+}
+
+/// How the gradients of several devices come together; the mean either way.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reduce {
+    /// They are copied to the first device, which adds them in the order of the shards: the same bytes in every
+    /// run, on every backend.
+    #[default]
+    Ordered,
+    /// Burn's own distributed layer: NCCL's all-reduce, on CUDA only, in the order in which devices finish.
+    Collective,
+}
+
+impl Reduce {
+    fn is_ordered(&self) -> bool {
+        *self == Self::Ordered
+    }
 }
 
 /// Weights to start from: files, or names of models in the program.

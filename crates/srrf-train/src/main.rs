@@ -130,6 +130,7 @@ fn train<C: Trained>(arguments: Arguments) -> Result<ExitCode, Failure> {
             e,
             RunError::Exists { .. }
                 | RunError::Devices { .. }
+                | RunError::Collective(_)
                 | RunError::Checkpoint(_)
                 | RunError::Start { .. }
                 | RunError::StartFile { .. }

@@ -4,6 +4,7 @@
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param, ParamId};
 use burn::optim::{GradientsParams, ModuleOptimizer};
+use burn::tensor::distributed::{CollectiveTensor, ReduceOperation, all_reduce};
 use burn::tensor::{Device, Tensor};
 
 /// The parameters of a part as rows, each with its gradient if it has one.
@@ -29,9 +30,8 @@ impl RowGradients {
         Self(self.0.into_iter().map(|row| row.map(|row| row.to_device(device))).collect())
     }
 
-    /// The mean, summed in the order given.
-    pub fn mean(all: Vec<Self>) -> Self {
-        let scale = 1.0 / all.len().max(1) as f64;
+    /// The sum, in the order given.
+    pub fn sum(all: impl IntoIterator<Item = Self>) -> Self {
         let sum = all.into_iter().reduce(|a, b| {
             let both = |(a, b): (Option<Tensor<1>>, Option<Tensor<1>>)| match (a, b) {
                 (Some(a), Some(b)) => Some(a + b),
@@ -39,11 +39,41 @@ impl RowGradients {
             };
             Self(a.0.into_iter().zip(b.0).map(both).collect())
         });
-        let mut mean = sum.unwrap_or_else(|| Self(Vec::new()));
-        if scale != 1.0 {
-            mean.scale(scale);
+        sum.unwrap_or_else(|| Self(Vec::new()))
+    }
+
+    /// The sum over devices, on the first of them, of the one that lies on each, by Burn's own distributed layer
+    /// (NCCL on CUDA): no host in between, and in the order in which the devices finish.
+    pub fn all_reduce(each: Vec<Self>, devices: &[Device]) -> Self {
+        // All are asked before any is waited for: each of them waits for the others.
+        let ask = |row: Tensor<1>| all_reduce(row, ReduceOperation::Sum, devices.to_vec());
+        let ask = |one: Self| one.0.into_iter().map(|row| row.map(ask)).collect::<Vec<_>>();
+        let asked: Vec<_> = each.into_iter().map(ask).collect();
+        // All are waited for, so that no memory is used again that is still being read.
+        let resolve = |one: Vec<Option<CollectiveTensor<1>>>| {
+            Self(one.into_iter().map(|row| row.map(CollectiveTensor::resolve)).collect())
+        };
+        let sums: Vec<_> = asked.into_iter().map(resolve).collect();
+        sums.into_iter().next().unwrap_or_else(|| Self(Vec::new()))
+    }
+
+    /// Whether [`RowGradients::all_reduce`] works on the devices of this name, tried with ones; why not, if not.
+    ///
+    /// # Errors
+    /// A sentence without its full stop.
+    pub fn can_all_reduce(name: &str, devices: &[Device]) -> Result<(), String> {
+        // Burn 0.22 panics elsewhere.
+        if !name.split(',').all(|device| device.trim().starts_with("cuda")) {
+            return Err(format!("Burn's distributed layer runs on cuda only, and the device is `{name}`"));
         }
-        mean
+        let ones = devices.iter().map(|device| Self(vec![Some(Tensor::ones([1], device))])).collect();
+        let sum = Self::all_reduce(ones, devices).norm();
+        match sum == devices.len() as f64 {
+            true => Ok(()),
+            false => Err(format!(
+                "1 from each of `{name}` added up to {sum}; see whether NCCL (libnccl.so) is installed"
+            )),
+        }
     }
 
     /// Euclidean norm over all parts; not finite where any number is not.
@@ -263,7 +293,8 @@ mod tests {
         let of = |aim| RowGradients::new(gradients(&net, aim), &net);
         let (a, b) = (of(0.0), of(3.0));
         assert_eq!((a.0.iter().flatten().count(), a.0.len()), (2, 3), "the last part has none");
-        let mut mean = RowGradients::mean(vec![a, b]);
+        let mut mean = RowGradients::sum([a, b]);
+        mean.scale(0.5);
         let norm = mean.norm();
         // The loss is quadratic, so its gradient at the mean of two aims is the mean of the gradients.
         assert!(norm > 1e-3 && (norm - of(1.5).norm()).abs() < 1e-5 * norm);

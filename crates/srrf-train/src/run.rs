@@ -16,13 +16,13 @@ use srrf_model::{init, is_accelerator};
 
 use crate::ahead::{Ahead, Closing};
 use crate::checkpoint::{self, CheckpointError, Progress};
-use crate::config::{DataSource, TrainConfig};
+use crate::config::{DataSource, Reduce, TrainConfig};
 use crate::data::TrainingPairs;
 use crate::log::{Log, progress_bar, summary};
 use crate::network::Trained;
 use crate::optimizer::optimizer;
 use crate::resources::cpu_seconds;
-use crate::rows::Updater;
+use crate::rows::{RowGradients, Updater};
 use crate::schedule::Plan;
 use crate::start::starting_model;
 use crate::step::{AheadOf, Losses, StepContext, StepError, Workers, device_of, gradient, prepare};
@@ -93,6 +93,9 @@ pub enum RunError {
         /// Shards of a batch.
         shards: usize,
     },
+    /// The devices cannot add up gradients among themselves.
+    #[error("reduce = \"collective\": {0}. reduce = \"ordered\" works on every device")]
+    Collective(String),
     /// Losses or gradients stay non-finite.
     #[error(
         "the loss or its gradient was not finite in {0} steps in a row; the last checkpoint is from before. \
@@ -272,6 +275,10 @@ impl<'a, C: Trained> Run<'a, C> {
         let shards = config.optimizer.shards();
         if devices.len() > shards {
             return Err(RunError::Devices { devices: devices.len(), shards });
+        }
+        if config.reduce == Reduce::Collective {
+            let name = config.device.as_deref().unwrap_or("flex");
+            RowGradients::can_all_reduce(name, &devices).map_err(RunError::Collective)?;
         }
         let folder = &options.folder;
         let io = |path: &Path, source| RunError::Io { path: path.to_path_buf(), source };

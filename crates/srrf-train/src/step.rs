@@ -14,7 +14,7 @@ use srrf_corrupt::Pair;
 use srrf_model::{HostPairs, SrrfConfig};
 
 use crate::ahead::Ahead;
-use crate::config::{StageConfig, TrainConfig};
+use crate::config::{Reduce, StageConfig, TrainConfig};
 use crate::data::TrainingPairs;
 use crate::network::{Shard, Trained};
 use crate::rows::RowGradients;
@@ -174,13 +174,26 @@ pub fn gradient<C: Trained>(
     let mut losses = Losses::new();
     for part in parts {
         let (gradients, part_losses) = part?;
-        // By the host's order, not by who is done first, so that the sum is the same in every run.
-        rows.push(if others.is_empty() { gradients } else { gradients.to_device(first) });
+        rows.push(gradients);
         for (name, value) in part_losses {
             *losses.entry(name).or_insert(0.0) += value / shards as f64;
         }
     }
-    let gradients = RowGradients::mean(rows);
+    let mut gradients = match context.config.reduce {
+        // By the host's order, not by who is done first, so that the sum is the same in every run.
+        Reduce::Ordered if others.is_empty() => RowGradients::sum(rows),
+        Reduce::Ordered => RowGradients::sum(rows.into_iter().map(|rows| rows.to_device(first))),
+        Reduce::Collective => {
+            let mut each: Vec<Vec<RowGradients>> = context.devices.iter().map(|_| Vec::new()).collect();
+            for (i, rows) in rows.into_iter().enumerate() {
+                each[device_of(i, context.devices)].push(rows);
+            }
+            RowGradients::all_reduce(each.into_iter().map(RowGradients::sum).collect(), context.devices)
+        }
+    };
+    if shards > 1 {
+        gradients.scale(1.0 / shards as f64);
+    }
     let norm = gradients.norm();
     Ok(StepOutcome { gradients, norm, losses })
 }

@@ -21,11 +21,11 @@ use burn::tensor::{DType, Device, Tensor};
 use srrf_cloud::shapes::ProceduralShapes;
 use srrf_model::weights::parameters;
 use srrf_model::{MatchingConfig, Srrf, correspondence_loss, init, registration_loss, skeleton_loss};
-use srrf_train::config::{SemTraining, TrainConfig};
+use srrf_train::config::{Reduce, SemTraining, TrainConfig};
 use srrf_train::data::TrainingPairs;
 use srrf_train::network::{Shard, Trained};
 use srrf_train::optimizer::optimizer;
-use srrf_train::rows::Updater;
+use srrf_train::rows::{RowGradients, Updater};
 use srrf_train::srrf::Layout;
 use srrf_train::step::{Prepared, StepContext, Workers, gradient, prepare, to_shard};
 
@@ -155,8 +155,8 @@ fn pass(device: &Device, dtype: DType) -> (Numbers, Numbers) {
 
 /// The loss of each of five training steps, and what every parameter moved. The shards of a batch go to the devices
 /// in turn.
-fn train(devices: &[Device]) -> (Vec<f64>, Vec<f64>) {
-    let config = config();
+fn train(devices: &[Device], reduce: Reduce) -> (Vec<f64>, Vec<f64>) {
+    let config = TrainConfig { reduce, ..config() };
     let (pairs, workers) = (pairs(&config), Workers::new(2).unwrap());
     let stage = config.stages.iter().find(|stage| stage.registration).unwrap();
     let context = StepContext { config: &config, stage, pairs: &pairs, devices, ahead: None };
@@ -233,9 +233,9 @@ fn agrees(name: &str, device: &Device, dtype: DType) -> Vec<Measured> {
 }
 
 /// Five training steps on devices against flex.
-fn trains(name: &str, devices: &[Device]) -> Vec<Measured> {
-    let (wanted, wanted_moved) = train(&[Device::flex()]);
-    let (found, moved) = train(devices);
+fn trains(name: &str, devices: &[Device], reduce: Reduce) -> Vec<Measured> {
+    let (wanted, wanted_moved) = train(&[Device::flex()], Reduce::Ordered);
+    let (found, moved) = train(devices, reduce);
     let losses = largest(&found.iter().zip(&wanted).map(|(a, b)| (a - b) / b).collect::<Vec<_>>());
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let difference: Vec<f64> = moved.iter().zip(&wanted_moved).map(|(a, b)| a - b).collect();
@@ -247,6 +247,22 @@ fn trains(name: &str, devices: &[Device]) -> Vec<Measured> {
     ]
 }
 
+#[allow(dead_code, reason = "the default build has flex alone")]
+/// Five training steps with Burn's own all-reduce: over both of two devices of CUDA, or over one where there is no
+/// second.
+fn collective(name: &str, device: &Device) -> Vec<Measured> {
+    if name != "cuda" {
+        return Vec::new();
+    }
+    let devices: Vec<Device> =
+        [Some(device.clone()), srrf_model::device("cuda:1").ok()].into_iter().flatten().collect();
+    if let Err(why) = RowGradients::can_all_reduce(name, &devices) {
+        eprintln!("skipped: collective on {} devices: {why}", devices.len());
+        return Vec::new();
+    }
+    trains(&format!("{name} x {}, collective", devices.len()), &devices, Reduce::Collective)
+}
+
 /// The whole suite on a device of this program, if this machine can run it.
 #[allow(dead_code, reason = "the default build has flex alone")]
 fn suite(name: &str) {
@@ -254,8 +270,10 @@ fn suite(name: &str) {
     match srrf_model::device(name) {
         Ok(device) => {
             let mut measured = agrees(name, &device, DType::F32);
-            measured.extend(trains(name, std::slice::from_ref(&device)));
-            measured.extend(trains(&format!("{name} and flex by turns"), &[device, Device::flex()]));
+            measured.extend(trains(name, std::slice::from_ref(&device), Reduce::Ordered));
+            measured.extend(collective(name, &device));
+            let by_turns = [device, Device::flex()];
+            measured.extend(trains(&format!("{name} and flex by turns"), &by_turns, Reduce::Ordered));
             hold(&measured);
         }
         Err(e) if required => panic!("{e}"),
@@ -270,14 +288,21 @@ fn flex_with_burns_own_operations_in_f64_agrees() {
 
 #[test]
 fn five_steps_teach_something() {
-    let (losses, moved) = train(&[Device::flex()]);
+    let (losses, moved) = train(&[Device::flex()], Reduce::Ordered);
     assert!(losses.len() == STEPS && largest(&moved) > 1e-3, "{losses:?}");
 }
 
 #[test]
 fn shards_on_two_devices_give_the_steps_of_one() {
     // A copy of the network for each, of the same kind here: the same bytes.
-    assert_eq!(train(&[Device::flex(), Device::flex()]), train(&[Device::flex()]));
+    let two = train(&[Device::flex(), Device::flex()], Reduce::Ordered);
+    assert_eq!(two, train(&[Device::flex()], Reduce::Ordered));
+}
+
+#[test]
+fn burns_own_layer_is_for_cuda_and_says_so() {
+    let why = RowGradients::can_all_reduce("flex", &[Device::flex()]).unwrap_err();
+    assert!(why.contains("cuda only") && why.contains("`flex`"), "{why}");
 }
 
 #[test]
