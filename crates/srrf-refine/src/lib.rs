@@ -35,7 +35,7 @@ mod solve;
 mod target;
 
 pub use affine::AffineFit;
-pub use config::{Deformed, Metric, RefineConfig, RefineError};
+pub use config::{Deformed, Metric, Ranking, RefineConfig, RefineError};
 pub use deformation::ResidualStructure;
 pub use evidence::Evidence;
 pub use refine::{Refinement, StartSupport, Verdict};

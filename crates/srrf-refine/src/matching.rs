@@ -11,6 +11,9 @@ use crate::solve::{Match, NormalEquations};
 /// not depend on the number of threads.
 const CHUNK: usize = 1024;
 
+/// Matches that are farther apart than this, in spacings, have no plane in common.
+const ON_PLANE: f64 = 3.0;
+
 /// Runs `work` on the chunks of `0..n`, beside each other if there are many, and gives the
 /// results in order.
 fn chunked<T: Send>(n: usize, work: impl Fn(std::ops::Range<usize>) -> T + Sync) -> Vec<T> {
@@ -117,6 +120,25 @@ pub(crate) fn support(source: &Level, target: &Level, pose: &Rigid, spacing: f64
     support_of(&from_source, &from_target, spacing)
 }
 
+/// Support in [0, 1] by the distances along the normals, `s^2 / (s^2 + r^2)` with `s` half a `spacing`, the mean over both clouds: two
+/// samplings of one surface share its planes and not their points. Beyond [`ON_PLANE`] spacings a plane says nothing, and the
+/// distance itself counts.
+pub(crate) fn plane_support(source: &Level, target: &Level, pose: &Rigid, spacing: f64) -> f64 {
+    let scale = (0.5 * spacing).powi(2);
+    let near = (ON_PLANE * spacing).powi(2);
+    let of = |(_, m): &(usize, Match)| {
+        let apart = m.moved - m.fixed;
+        let squared = apart.norm_squared();
+        let residual = if squared < near { apart.dot(&m.normal).powi(2) } else { squared };
+        scale / (scale + residual)
+    };
+    let [from_source, from_target] = [Side::Source, Side::Target].map(|side| {
+        let matches = side_matches(source, target, pose, side);
+        matches.iter().map(of).sum::<f64>() / matches.len() as f64
+    });
+    0.5 * (from_source + from_target)
+}
+
 /// Support in [0, 1] of squared distances to the nearest point of the other cloud: the mean over both clouds of
 /// `s^2 / (s^2 + r^2)`, over three scales `s` of `spacing`: 1, 0.3 and 0.1. Both clouds count alike, whatever their sizes.
 pub(crate) fn support_of(from_source: &[f64], from_target: &[f64], spacing: f64) -> f64 {
@@ -132,4 +154,43 @@ pub(crate) fn support_of(from_source: &[f64], from_target: &[f64], spacing: f64)
 pub(crate) fn motion(pose: &Rigid, next: &Rigid, radius: f64) -> f64 {
     let shift: Vector3<f64> = next.translation - pose.translation;
     shift.norm() + (next.rotation - pose.rotation).norm() * radius
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+    use srrf_cloud::PointCloud;
+
+    use super::*;
+    use crate::RefineConfig;
+    use crate::prepared::{Prepared, to_local};
+
+    /// Points of a saddle, by chance.
+    fn saddle(seed: u64) -> Prepared {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let points = (0..600).map(|_| {
+            let [x, y]: [f64; 2] = rng.random();
+            [x, y, 0.4 * (x - 0.5) * (y - 0.4)]
+        });
+        Prepared::new(&PointCloud::new(points.collect()).unwrap(), &RefineConfig::default()).unwrap()
+    }
+
+    #[test]
+    fn two_samplings_share_planes_and_not_points() {
+        let (one, other) = (saddle(1), saddle(2));
+        let at = |up: f64| {
+            let lifted = Rigid { translation: Vector3::new(0.0, 0.0, up), ..Rigid::identity() };
+            let pose = to_local(&lifted, &one, &other);
+            let (s, t) = (one.coarse(), other.coarse());
+            [support, plane_support].map(|of| of(s, t, &pose, s.spacing.max(t.spacing)))
+        };
+        let spacing = one.coarse().spacing;
+        let [points, planes] = at(0.0);
+        assert!(planes > 0.95 && points < 0.6, "{points} {planes}");
+        // Off the surface the planes say so.
+        assert!(at(2.0 * spacing)[1] < 0.1, "{:?}", at(2.0 * spacing));
+        // Far away there are no planes to lie on.
+        assert!(at(40.0 * spacing)[1] < 0.01);
+    }
 }

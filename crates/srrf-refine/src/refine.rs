@@ -9,11 +9,11 @@ use srrf_cloud::Rigid;
 use crate::affine::{AffineFit, affine_fit};
 use crate::deformation::{ResidualStructure, residual_structure};
 use crate::evidence::{Evidence, evidence};
-use crate::matching::support;
+use crate::matching::{plane_support, support};
 use crate::prepared::{Prepared, to_global, to_local};
 use crate::robust::{Schedule, Stage, descend};
 use crate::soft::soft;
-use crate::{Deformed, Metric, RefineConfig, RefineError};
+use crate::{Deformed, Metric, Ranking, RefineConfig, RefineError};
 
 /// Residuals count as deformation when they correlate with those of their neighbours in the same cloud by more than the first
 /// number, and along the normals with those of their neighbours in the other cloud by more than the second. Each test alone takes
@@ -74,8 +74,17 @@ pub struct StartSupport {
     /// Symmetric robust score after the short run, in [0, 1]: the mean over both clouds of
     /// `s^2 / (s^2 + r^2)`, `r` the distance to the other cloud, for `s` of 1, 0.3 and 0.1 point spacings.
     pub support: f64,
+    /// What it is compared by, in [0, 1]: `support`, or what [`Ranking`] says.
+    pub rank: f64,
     /// The pose after the short run.
     pub target_from_source: Rigid,
+}
+
+impl StartSupport {
+    /// Number of the best of `starts`, the first of equals; `None` where there are none.
+    pub fn best(starts: &[Self]) -> Option<usize> {
+        (0..starts.len()).reduce(|a, b| if starts[b].rank > starts[a].rank { b } else { a })
+    }
 }
 
 /// A refined pose.
@@ -118,9 +127,14 @@ impl Run<'_> {
     pub fn shortlist(&self, starts: &[(&str, Rigid)]) -> Vec<StartSupport> {
         let run = |(name, given): &(&str, Rigid), short: bool| {
             let local = to_local(given, self.source, self.target);
-            let (pose, support) = if short { self.short_run(&local) } else { (local, self.support(&local)) };
+            let pose = if short { self.short_run(&local) } else { local };
             let target_from_source = if short { to_global(&pose, self.source, self.target) } else { *given };
-            StartSupport { name: (*name).to_owned(), given: *given, support, target_from_source }
+            let support = self.support(&pose);
+            let rank = match self.config.ranking {
+                Ranking::Points => support,
+                Ranking::Planes => self.plane_support(&pose),
+            };
+            StartSupport { name: (*name).to_owned(), given: *given, support, rank, target_from_source }
         };
         match starts {
             [only] => vec![run(only, false)],
@@ -130,9 +144,7 @@ impl Run<'_> {
 
     /// The full run of the best of `starts`, and what to make of it.
     pub fn finish(&self, starts: &[StartSupport]) -> Result<Refinement, RefineError> {
-        // The first of equals wins.
-        let best = starts.iter().reduce(|a, b| if b.support > a.support { b } else { a });
-        let Some(best) = best else { return Err(RefineError::NoStart) };
+        let best = &starts[StartSupport::best(starts).ok_or(RefineError::NoStart)?];
 
         let start = to_local(&best.given, self.source, self.target);
         let mut stage = self.full_run(&to_local(&best.target_from_source, self.source, self.target));
@@ -197,21 +209,25 @@ impl Run<'_> {
         })
     }
 
-    /// A few iterations on the coarse level, and the support there.
-    fn short_run(&self, start: &Rigid) -> (Rigid, f64) {
+    /// A few iterations on the coarse level.
+    fn short_run(&self, start: &Rigid) -> Rigid {
         let (s, t) = (self.source.coarse(), self.target.coarse());
         let schedule = Schedule {
             iterations: self.config.start_iterations,
             first_stride: s.points().len().max(t.points().len()).div_ceil(512),
             ..Schedule::new(s, t, start, self.target.radius, self.config)
         };
-        let stage = self.descend_on(false, start, &schedule, self.config.metric);
-        (stage.pose, self.support(&stage.pose))
+        self.descend_on(false, start, &schedule, self.config.metric).pose
     }
 
     fn support(&self, pose: &Rigid) -> f64 {
         let (s, t) = (self.source.coarse(), self.target.coarse());
         support(s, t, pose, s.spacing.max(t.spacing))
+    }
+
+    fn plane_support(&self, pose: &Rigid) -> f64 {
+        let (s, t) = (self.source.coarse(), self.target.coarse());
+        plane_support(s, t, pose, s.spacing.max(t.spacing))
     }
 
     /// Coarse, fine, soft.

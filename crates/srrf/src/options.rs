@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 use srrf_cloud::Rigid;
-use srrf_refine::{Deformed, RefineConfig};
+use srrf_refine::{Deformed, Ranking, RefineConfig};
 
 /// How starts for the refinement are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -117,7 +117,11 @@ impl Default for Options {
             method: Method::Auto,
             rotation: RotationRange::Any,
             given: None,
-            refine: Some(RefineConfig { deformed: Deformed::Halfway, ..RefineConfig::default() }),
+            refine: Some(RefineConfig {
+                ranking: Ranking::Planes,
+                deformed: Deformed::Halfway,
+                ..RefineConfig::default()
+            }),
             weights: None,
             device: "flex".to_owned(),
             seed: 0,

@@ -110,7 +110,7 @@ impl Outcome {
                 "support": r.support,
                 "residual_correlation": r.residuals.correlation,
                 "residual_correlation_across": r.residuals.across_correlation,
-                "starts": r.starts.iter().map(|s| json!({ "name": s.name, "support": s.support })).collect::<Vec<_>>(),
+                "starts": r.starts.iter().map(|s| json!({ "name": s.name, "support": s.support, "rank": s.rank })).collect::<Vec<_>>(),
             })),
             "evidence": {
                 "spacing": evidence.spacing,

@@ -6,11 +6,11 @@ use serde_json::{Value, json};
 use srrf_cloud::Rigid;
 use srrf_refine::{Evidence, Refinement, Verdict};
 
-/// Starts with so much of the best one's support have a say in whether others agree. However many poor starts are tried, they have none.
-const WELL_SUPPORTED: f64 = 0.9;
+/// Starts with so much of the best one's rank have a say in whether others agree. However many poor starts are tried, they have none.
+const WELL_SUPPORTED: f64 = 0.95;
 
 /// Number of features.
-pub const FEATURES: usize = 9;
+pub const FEATURES: usize = 10;
 
 const NAMES: [&str; FEATURES] = [
     "fitness",
@@ -22,6 +22,7 @@ const NAMES: [&str; FEATURES] = [
     "rival_support",
     "agreeing_starts",
     "deformed",
+    "rank",
 ];
 
 /// What the probability is computed from: numbers without a unit, of the pose and of its rivals. The
@@ -30,19 +31,20 @@ const NAMES: [&str; FEATURES] = [
 pub struct Features(pub [f64; FEATURES]);
 
 impl Features {
-    /// The features of a pose. `rivals` are poses of other starts after their short run, with their
-    /// support; one counts as another pose when it is turned by more than 5 degrees.
+    /// The features of a pose. `rank` is that of the start it comes from, `rivals` are the poses of all starts after their short run,
+    /// with their ranks ([`srrf_refine::StartSupport::rank`]); one counts as another pose when it is turned by more than 5 degrees.
     pub fn new(
         evidence: &Evidence,
         refinement: Option<&Refinement>,
         pose: &Rigid,
+        rank: f64,
         rivals: &[(Rigid, f64)],
     ) -> Self {
         let support = refinement.map_or(evidence.fitness, |r| r.support);
         let apart = |other: &Rigid| pose.angle_to_deg(other) > 5.0;
-        let rival = rivals.iter().filter(|(p, _)| apart(p)).map(|(_, s)| *s).fold(0.0, f64::max);
-        let best = rivals.iter().map(|(_, s)| *s).fold(0.0, f64::max);
-        let with_a_say: Vec<_> = rivals.iter().filter(|(_, s)| *s >= WELL_SUPPORTED * best).collect();
+        let rival = rivals.iter().filter(|(p, _)| apart(p)).map(|(_, rank)| *rank).fold(0.0, f64::max);
+        let best = rivals.iter().map(|(_, rank)| *rank).fold(0.0, f64::max);
+        let with_a_say: Vec<_> = rivals.iter().filter(|(_, rank)| *rank >= WELL_SUPPORTED * best).collect();
         let agreeing =
             with_a_say.iter().filter(|(p, _)| !apart(p)).count() as f64 / with_a_say.len().max(1) as f64;
         let spacing = evidence.spacing.max(f64::MIN_POSITIVE);
@@ -53,9 +55,10 @@ impl Features {
             support,
             refinement.map_or(0.0, |r| r.residuals.correlation),
             refinement.map_or(1.0, |r| r.residuals.median.min(3.0)),
-            rival / support.max(1e-3),
+            rival / rank.max(1e-3),
             agreeing,
             f64::from(u8::from(refinement.is_some_and(|r| r.verdict == Verdict::Deformed))),
+            rank,
         ])
     }
 
@@ -219,12 +222,12 @@ mod tests {
             ..Rigid::identity()
         };
         let agreeing = |rivals: &[(Rigid, f64)]| {
-            Features::new(&evidence, None, &turned(0.0), rivals).to_json()["agreeing_starts"]
+            Features::new(&evidence, None, &turned(0.0), 0.5, rivals).to_json()["agreeing_starts"]
                 .as_f64()
                 .unwrap()
         };
         let mut rivals =
-            vec![(turned(0.0), 0.50), (turned(3.0), 0.48), (turned(90.0), 0.46), (turned(1.0), 0.40)];
+            vec![(turned(0.0), 0.50), (turned(3.0), 0.49), (turned(90.0), 0.48), (turned(1.0), 0.40)];
         assert!((agreeing(&rivals) - 2.0 / 3.0).abs() < 1e-12);
         rivals.extend((0..100).map(|i| (turned(f64::from(i) + 20.0), 0.3)));
         assert!((agreeing(&rivals) - 2.0 / 3.0).abs() < 1e-12);
@@ -234,10 +237,10 @@ mod tests {
     #[test]
     fn the_one_in_the_program_loads() {
         let model = Logistic::embedded().unwrap();
-        let good = Features([1.0, 1.0, 0.1, 0.9, 0.0, 0.05, 0.3, 1.0, 0.0]);
-        let bad = Features([0.3, 0.3, 0.6, 0.2, 0.5, 1.5, 1.0, 0.1, 0.0]);
+        let good = Features([1.0, 1.0, 0.1, 0.9, 0.0, 0.05, 0.3, 1.0, 0.0, 0.95]);
+        let bad = Features([0.3, 0.3, 0.6, 0.2, 0.5, 1.5, 1.0, 0.1, 0.0, 0.4]);
         // What `srrf register` finds of bun315 and bun090, two scans that share a tenth, in a wrong pose.
-        let wrong = Features([0.0947, 0.0976, 0.6642, 0.1153, 0.4039, 3.0, 1.0124, 0.4, 0.0]);
+        let wrong = Features([0.0947, 0.0976, 0.6642, 0.1153, 0.4039, 3.0, 1.0124, 0.4, 0.0, 0.3]);
         let [good, bad, wrong] = [good, bad, wrong].map(|features| model.probability(&features));
         assert!(good > 0.9 && bad < 0.5 && wrong < 0.3, "{good} {bad} {wrong}");
     }

@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 use srrf_baselines::{FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, Skeletons};
-use srrf_refine::{RefineError, RefineTarget};
+use srrf_refine::{Ranking, RefineError, RefineTarget};
 
 use crate::frame::{Centred, from_input, to_input};
 use crate::network::{Network, thinned};
@@ -234,12 +234,13 @@ impl Registrar {
         })
     }
 
-    /// The calibrated probability. It was fitted on [`Method::Auto`] with refinement; for other methods, whose
-    /// few starts give no rivals to compare with, and for poses without refinement, it is kept below the square
+    /// The calibrated probability. It was fitted on [`Method::Auto`] with refinement and starts ranked by planes; for other methods,
+    /// whose few starts give no rivals to compare with, other ranks, and poses without refinement, it is kept below the square
     /// of the fitness, which only errs on the side of doubt.
     fn probability(&self, features: &Features) -> f64 {
         let fitted = self.calibration.probability(features);
-        let known = self.options.method == Method::Auto && self.options.refine.is_some();
+        let ranking = self.options.refine.map(|config| config.ranking);
+        let known = self.options.method == Method::Auto && ranking == Some(Ranking::Planes);
         if known { fitted } else { fitted.min(features.fitness().powi(2)) }
     }
 
