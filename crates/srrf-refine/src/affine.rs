@@ -152,7 +152,7 @@ mod tests {
 
     use super::*;
     use crate::RefineConfig;
-    use crate::matching::support;
+    use crate::matching::{both_sides, support};
     use crate::prepared::{Prepared, to_local};
 
     /// A pair that samples one shape twice.
@@ -178,7 +178,7 @@ mod tests {
         let prepared = |cloud| Prepared::new(cloud, &RefineConfig::default()).unwrap();
         let (source, target) = (prepared(source), prepared(target));
         let (source, target, pose) = (source.coarse(), target.coarse(), to_local(pose, &source, &target));
-        let support = support(source, target, &pose, source.spacing.max(target.spacing));
+        let support = support(&both_sides(source, target, &pose), source.spacing.max(target.spacing));
         affine_fit(source, target, &pose, support)
     }
 

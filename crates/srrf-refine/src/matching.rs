@@ -96,34 +96,35 @@ pub(crate) fn equations(
     sums
 }
 
-/// Squared distances of the matches of both sides, source first.
-pub(crate) fn squared_distances(source: &Level, target: &Level, pose: &Rigid) -> [Vec<f64>; 2] {
-    [Side::Source, Side::Target].map(|side| {
-        side_matches(source, target, pose, side)
-            .iter()
-            .map(|(_, m)| (m.moved - m.fixed).norm_squared())
-            .collect()
-    })
+/// The matches of both sides, source first.
+pub(crate) fn both_sides(source: &Level, target: &Level, pose: &Rigid) -> [Vec<(usize, Match)>; 2] {
+    [Side::Source, Side::Target].map(|side| side_matches(source, target, pose, side))
+}
+
+/// Squared distances of matches.
+fn squared_distances(matches: &[Vec<(usize, Match)>; 2]) -> [Vec<f64>; 2] {
+    let squared = |(_, m): &(usize, Match)| (m.moved - m.fixed).norm_squared();
+    matches.each_ref().map(|side| side.iter().map(squared).collect())
 }
 
 /// Median distance over the matches of both sides.
 pub(crate) fn median_distance(source: &Level, target: &Level, pose: &Rigid) -> f64 {
-    let [mut all, more] = squared_distances(source, target, pose);
+    let [mut all, more] = squared_distances(&both_sides(source, target, pose));
     all.extend(more);
     let middle = all.len() / 2;
     all.select_nth_unstable_by(middle, f64::total_cmp).1.sqrt()
 }
 
 /// How well a pose is supported, by [`support_of`] the distances of its matches.
-pub(crate) fn support(source: &Level, target: &Level, pose: &Rigid, spacing: f64) -> f64 {
-    let [from_source, from_target] = squared_distances(source, target, pose);
+pub(crate) fn support(matches: &[Vec<(usize, Match)>; 2], spacing: f64) -> f64 {
+    let [from_source, from_target] = squared_distances(matches);
     support_of(&from_source, &from_target, spacing)
 }
 
 /// Support in [0, 1] by the distances along the normals, `s^2 / (s^2 + r^2)` with `s` half a `spacing`, the mean over both clouds: two
 /// samplings of one surface share its planes and not their points. Beyond [`ON_PLANE`] spacings a plane says nothing, and the
 /// distance itself counts.
-pub(crate) fn plane_support(source: &Level, target: &Level, pose: &Rigid, spacing: f64) -> f64 {
+pub(crate) fn plane_support(matches: &[Vec<(usize, Match)>; 2], spacing: f64) -> f64 {
     let scale = (0.5 * spacing).powi(2);
     let near = (ON_PLANE * spacing).powi(2);
     let of = |(_, m): &(usize, Match)| {
@@ -132,10 +133,8 @@ pub(crate) fn plane_support(source: &Level, target: &Level, pose: &Rigid, spacin
         let residual = if squared < near { apart.dot(&m.normal).powi(2) } else { squared };
         scale / (scale + residual)
     };
-    let [from_source, from_target] = [Side::Source, Side::Target].map(|side| {
-        let matches = side_matches(source, target, pose, side);
-        matches.iter().map(of).sum::<f64>() / matches.len() as f64
-    });
+    let [from_source, from_target] =
+        matches.each_ref().map(|side| side.iter().map(of).sum::<f64>() / side.len() as f64);
     0.5 * (from_source + from_target)
 }
 
@@ -183,7 +182,8 @@ mod tests {
             let lifted = Rigid { translation: Vector3::new(0.0, 0.0, up), ..Rigid::identity() };
             let pose = to_local(&lifted, &one, &other);
             let (s, t) = (one.coarse(), other.coarse());
-            [support, plane_support].map(|of| of(s, t, &pose, s.spacing.max(t.spacing)))
+            let matches = both_sides(s, t, &pose);
+            [support, plane_support].map(|of| of(&matches, s.spacing.max(t.spacing)))
         };
         let spacing = one.coarse().spacing;
         let [points, planes] = at(0.0);

@@ -9,7 +9,7 @@ use srrf_cloud::Rigid;
 use crate::affine::{AffineFit, affine_fit};
 use crate::deformation::{ResidualStructure, residual_structure};
 use crate::evidence::{Evidence, evidence};
-use crate::matching::{plane_support, support};
+use crate::matching::{both_sides, plane_support, support};
 use crate::prepared::{Prepared, to_global, to_local};
 use crate::robust::{Schedule, Stage, descend};
 use crate::soft::soft;
@@ -129,10 +129,12 @@ impl Run<'_> {
             let local = to_local(given, self.source, self.target);
             let pose = if short { self.short_run(&local) } else { local };
             let target_from_source = if short { to_global(&pose, self.source, self.target) } else { *given };
-            let support = self.support(&pose);
+            let (s, t) = (self.source.coarse(), self.target.coarse());
+            let (matches, spacing) = (both_sides(s, t, &pose), s.spacing.max(t.spacing));
+            let support = support(&matches, spacing);
             let rank = match self.config.ranking {
                 Ranking::Points => support,
-                Ranking::Planes => self.plane_support(&pose),
+                Ranking::Planes => plane_support(&matches, spacing),
             };
             StartSupport { name: (*name).to_owned(), given: *given, support, rank, target_from_source }
         };
@@ -222,12 +224,7 @@ impl Run<'_> {
 
     fn support(&self, pose: &Rigid) -> f64 {
         let (s, t) = (self.source.coarse(), self.target.coarse());
-        support(s, t, pose, s.spacing.max(t.spacing))
-    }
-
-    fn plane_support(&self, pose: &Rigid) -> f64 {
-        let (s, t) = (self.source.coarse(), self.target.coarse());
-        plane_support(s, t, pose, s.spacing.max(t.spacing))
+        support(&both_sides(s, t, pose), s.spacing.max(t.spacing))
     }
 
     /// Coarse, fine, soft.
