@@ -239,9 +239,9 @@ mod tests {
         let model = Logistic::embedded().unwrap();
         let good = Features([1.0, 1.0, 0.1, 0.9, 0.0, 0.05, 0.3, 1.0, 0.0, 0.95]);
         let bad = Features([0.3, 0.3, 0.6, 0.2, 0.5, 1.5, 1.0, 0.1, 0.0, 0.4]);
-        // What `srrf register` finds of bun315 and bun090, two scans that share a tenth, in a wrong pose.
-        let wrong = Features([0.0947, 0.0976, 0.6642, 0.1153, 0.4039, 3.0, 1.0124, 0.4, 0.0, 0.3]);
-        let [good, bad, wrong] = [good, bad, wrong].map(|features| model.probability(&features));
-        assert!(good > 0.9 && bad < 0.5 && wrong < 0.3, "{good} {bad} {wrong}");
+        // What `srrf register --seed 1` finds of bun315 and bun090, two scans that share a tenth, 4 degrees off.
+        let doubtful = Features([0.0957, 0.0978, 0.6686, 0.1153, 0.3984, 3.0, 0.9605, 0.5, 0.0, 0.2537]);
+        let [good, bad, doubtful] = [good, bad, doubtful].map(|features| model.probability(&features));
+        assert!(good > 0.9 && bad < 0.5 && doubtful < 0.3, "{good} {bad} {doubtful}");
     }
 }
