@@ -40,6 +40,7 @@ pub use batch::{HostPairs, PairBatch, PairFrame};
 pub use branch::{Branch, BranchConfig, BranchOutput};
 pub use device::{
     DeviceError, NAMES as DEVICE_NAMES, built_in as built_in_devices, device, devices, is_accelerator,
+    kind as device_kind,
 };
 pub use inference::{InferenceConfig, Matches};
 pub use integration::{BranchPose, Fusion, InlierTest, IntegrationConfig};

@@ -96,13 +96,16 @@ pub(crate) fn equations(
     sums
 }
 
-/// The matches of both sides, source first.
-pub(crate) fn both_sides(source: &Level, target: &Level, pose: &Rigid) -> [Vec<(usize, Match)>; 2] {
+/// The matches of both sides, source first, as [`side_matches`] gives them.
+pub(crate) type BothSides = [Vec<(usize, Match)>; 2];
+
+/// The matches of both sides.
+pub(crate) fn both_sides(source: &Level, target: &Level, pose: &Rigid) -> BothSides {
     [Side::Source, Side::Target].map(|side| side_matches(source, target, pose, side))
 }
 
 /// Squared distances of matches.
-fn squared_distances(matches: &[Vec<(usize, Match)>; 2]) -> [Vec<f64>; 2] {
+fn squared_distances(matches: &BothSides) -> [Vec<f64>; 2] {
     let squared = |(_, m): &(usize, Match)| (m.moved - m.fixed).norm_squared();
     matches.each_ref().map(|side| side.iter().map(squared).collect())
 }
@@ -116,7 +119,7 @@ pub(crate) fn median_distance(source: &Level, target: &Level, pose: &Rigid) -> f
 }
 
 /// How well a pose is supported, by [`support_of`] the distances of its matches.
-pub(crate) fn support(matches: &[Vec<(usize, Match)>; 2], spacing: f64) -> f64 {
+pub(crate) fn support(matches: &BothSides, spacing: f64) -> f64 {
     let [from_source, from_target] = squared_distances(matches);
     support_of(&from_source, &from_target, spacing)
 }
@@ -124,7 +127,7 @@ pub(crate) fn support(matches: &[Vec<(usize, Match)>; 2], spacing: f64) -> f64 {
 /// Support in [0, 1] by the distances along the normals, `s^2 / (s^2 + r^2)` with `s` half a `spacing`, the mean over both clouds: two
 /// samplings of one surface share its planes and not their points. Beyond [`ON_PLANE`] spacings a plane says nothing, and the
 /// distance itself counts.
-pub(crate) fn plane_support(matches: &[Vec<(usize, Match)>; 2], spacing: f64) -> f64 {
+pub(crate) fn plane_support(matches: &BothSides, spacing: f64) -> f64 {
     let scale = (0.5 * spacing).powi(2);
     let near = (ON_PLANE * spacing).powi(2);
     let of = |(_, m): &(usize, Match)| {

@@ -9,7 +9,7 @@ use srrf_cloud::Rigid;
 use crate::affine::{AffineFit, affine_fit};
 use crate::deformation::{ResidualStructure, residual_structure};
 use crate::evidence::{Evidence, evidence};
-use crate::matching::{both_sides, plane_support, support};
+use crate::matching::{BothSides, both_sides, plane_support, support};
 use crate::prepared::{Prepared, to_global, to_local};
 use crate::robust::{Schedule, Stage, descend};
 use crate::soft::soft;
@@ -129,8 +129,7 @@ impl Run<'_> {
             let local = to_local(given, self.source, self.target);
             let pose = if short { self.short_run(&local) } else { local };
             let target_from_source = if short { to_global(&pose, self.source, self.target) } else { *given };
-            let (s, t) = (self.source.coarse(), self.target.coarse());
-            let (matches, spacing) = (both_sides(s, t, &pose), s.spacing.max(t.spacing));
+            let (matches, spacing) = self.coarse_matches(&pose);
             let support = support(&matches, spacing);
             let rank = match self.config.ranking {
                 Ranking::Points => support,
@@ -223,8 +222,14 @@ impl Run<'_> {
     }
 
     fn support(&self, pose: &Rigid) -> f64 {
+        let (matches, spacing) = self.coarse_matches(pose);
+        support(&matches, spacing)
+    }
+
+    /// The matches of both sides on the coarse level, and the spacing there.
+    fn coarse_matches(&self, pose: &Rigid) -> (BothSides, f64) {
         let (s, t) = (self.source.coarse(), self.target.coarse());
-        support(&both_sides(s, t, pose), s.spacing.max(t.spacing))
+        (both_sides(s, t, pose), s.spacing.max(t.spacing))
     }
 
     /// Coarse, fine, soft.

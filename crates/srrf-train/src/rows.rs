@@ -6,6 +6,7 @@ use burn::module::{Module, ModuleMapper, ModuleVisitor, Param, ParamId};
 use burn::optim::{GradientsParams, ModuleOptimizer};
 use burn::tensor::distributed::{CollectiveTensor, ReduceOperation, all_reduce};
 use burn::tensor::{Device, Tensor};
+use srrf_model::device_kind;
 
 /// The parameters of a part as rows, each with its gradient if it has one.
 type Part = Vec<(Tensor<1>, Option<Tensor<1>>)>;
@@ -63,7 +64,7 @@ impl RowGradients {
     /// A sentence without its full stop.
     pub fn can_all_reduce(name: &str, devices: &[Device]) -> Result<(), String> {
         // Burn 0.22 panics elsewhere.
-        if !name.split(',').all(|device| device.trim().starts_with("cuda")) {
+        if device_kind(name) != "cuda" {
             return Err(format!("Burn's distributed layer runs on cuda only, and the device is `{name}`"));
         }
         let ones = devices.iter().map(|device| Self(vec![Some(Tensor::ones([1], device))])).collect();

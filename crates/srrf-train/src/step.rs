@@ -181,8 +181,10 @@ pub fn gradient<C: Trained>(
     }
     let mut gradients = match context.config.reduce {
         // By the host's order, not by who is done first, so that the sum is the same in every run.
-        Reduce::Ordered if others.is_empty() => RowGradients::sum(rows),
-        Reduce::Ordered => RowGradients::sum(rows.into_iter().map(|rows| rows.to_device(first))),
+        Reduce::Ordered => {
+            let here = |rows: RowGradients| if others.is_empty() { rows } else { rows.to_device(first) };
+            RowGradients::sum(rows.into_iter().map(here))
+        }
         Reduce::Collective => {
             let mut each: Vec<Vec<RowGradients>> = context.devices.iter().map(|_| Vec::new()).collect();
             for (i, rows) in rows.into_iter().enumerate() {

@@ -247,9 +247,9 @@ fn trains(name: &str, devices: &[Device], reduce: Reduce) -> Vec<Measured> {
     ]
 }
 
-#[allow(dead_code, reason = "the default build has flex alone")]
 /// Five training steps with Burn's own all-reduce: over both of two devices of CUDA, or over one where there is no
 /// second.
+#[allow(dead_code, reason = "the default build has flex alone")]
 fn collective(name: &str, device: &Device) -> Vec<Measured> {
     if name != "cuda" {
         return Vec::new();

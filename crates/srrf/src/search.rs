@@ -25,15 +25,14 @@ pub struct Search<'a> {
     source: RefineSource,
     refine: bool,
     starts: Vec<StartSupport>,
-    refined: Option<(usize, Refinement)>,
-    /// What the first round came to, with the number of its start.
-    first: Option<(usize, Refinement)>,
+    /// Full runs so far, each after the number of its start; that of the first round comes first.
+    refined: Vec<(usize, Refinement)>,
 }
 
 impl<'a> Search<'a> {
     /// Without starts. Where `refine` is false they are compared as they are.
     pub fn new(target: &'a RefineTarget, source: RefineSource, refine: bool) -> Self {
-        Self { target, source, refine, starts: Vec::new(), refined: None, first: None }
+        Self { target, source, refine, starts: Vec::new(), refined: Vec::new() }
     }
 
     /// One more round.
@@ -62,16 +61,15 @@ impl<'a> Search<'a> {
             let features = Features::new(&evidence, None, &pose, starts[best].rank, &rivals);
             return Ok(Found { pose, start, refinement: None, evidence, features });
         }
-        let refined = match self.refined.take() {
-            Some((same, refined)) if same == best => refined,
-            _ => self.target.finish(&self.source, starts)?,
+        let run = match self.refined.iter().position(|(start, _)| *start == best) {
+            Some(run) => run,
+            None => {
+                self.refined.push((best, self.target.finish(&self.source, starts)?));
+                self.refined.len() - 1
+            }
         };
-        self.refined = Some((best, refined.clone()));
-        let (from, refined) = match &self.first {
-            Some(first) if refined.verdict == Verdict::Deformed => first.clone(),
-            _ => (best, refined),
-        };
-        self.first.get_or_insert_with(|| (from, refined.clone()));
+        let stands = if self.refined[run].1.verdict == Verdict::Deformed { 0 } else { run };
+        let (from, refined) = self.refined[stands].clone();
         let refined = Refinement { starts: starts.clone(), ..refined };
         let (pose, start, evidence) =
             (refined.target_from_source, refined.start.clone(), refined.evidence.clone());

@@ -38,8 +38,12 @@ pub const NAMES: [&str; 6] = ["flex", "ndarray", "wgpu", "vulkan", "cuda", "libt
 /// Whether the device of this name, or the first of this list, computes on another processor than the
 /// host. `libtorch` counts as one, since it is there for CUDA.
 pub fn is_accelerator(name: &str) -> bool {
-    let kind = name.split([':', ',']).next();
-    !["flex", "ndarray"].map(Some).contains(&kind)
+    !["flex", "ndarray"].contains(&kind(name))
+}
+
+/// The kind of the device of this name, or of those of this list: `cuda` of `cuda:0,cuda:1`.
+pub fn kind(name: &str) -> &str {
+    name.split([':', ',']).next().unwrap_or(name).trim()
 }
 
 /// Names of the devices that this program was built with.
