@@ -6,6 +6,7 @@ use crate::EvalError;
 use crate::chamfer::SkeletonAgreement;
 use crate::metrics::{PairError, Scores};
 use crate::run::Outcome;
+use crate::synthesized::CLEAN;
 
 /// Which severities a row of the summary covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,6 +107,19 @@ impl Summary {
     /// The methods, in order.
     pub fn methods(&self) -> Vec<&str> {
         distinct(self.rows.iter().map(|r| r.method.as_str()))
+    }
+
+    /// The mean of a value over the corruptions, clean pairs aside; `None` where one lacks it, and where
+    /// there are fewer than two.
+    pub(crate) fn over_corruptions(
+        &self,
+        method: &str,
+        value: impl Fn(&SummaryRow) -> Option<f64>,
+    ) -> Option<f64> {
+        let corruptions = self.corruptions().into_iter().filter(|c| *c != CLEAN);
+        let row = |corruption| self.get(corruption, SeverityKey::Mean, method);
+        let values: Vec<f64> = corruptions.map(|c| row(c).and_then(&value)).collect::<Option<_>>()?;
+        (values.len() > 1).then(|| values.iter().sum::<f64>() / values.len() as f64)
     }
 
     /// The severities above 0, ascending.

@@ -6,6 +6,7 @@ use crate::methods::ORACLE;
 use crate::metrics::Scores;
 use crate::quantities::{QUANTITIES, Quantity};
 use crate::summary::{SeverityKey, Summary, SummaryRow};
+use crate::synthesized::CLEAN;
 
 /// The tables for the screen: the principal quantities, means over severities.
 pub(crate) fn screen(summary: &Summary) -> String {
@@ -66,16 +67,10 @@ fn section(
         let values: Vec<Option<f64>> = methods.iter().map(|m| cell(corruption, m)).collect();
         lines.push(line(corruption, quantity, &methods, &values));
     }
-    let corrupted: Vec<&&str> = corruptions.iter().filter(|c| **c != "clean").collect();
-    if corrupted.len() > 1 {
-        let means: Vec<Option<f64>> = methods
-            .iter()
-            .map(|m| {
-                let values: Option<Vec<f64>> = corrupted.iter().map(|c| cell(c, m)).collect();
-                values.map(|v| v.iter().sum::<f64>() / v.len() as f64)
-            })
-            .collect();
-        let name = if corrupted.len() < corruptions.len() { "mean of corruptions" } else { "mean" };
+    let mean = |method: &&str| summary.over_corruptions(method, |row| scores(row).and_then(quantity.value));
+    let means: Vec<Option<f64>> = methods.iter().map(mean).collect();
+    if means.iter().any(Option::is_some) {
+        let name = if corruptions.contains(&CLEAN) { "mean of corruptions" } else { "mean" };
         lines.push(line(name, quantity, &methods, &means));
     }
     format!("{marks}{}\n\n{}", quantity.title, aligned(&lines))

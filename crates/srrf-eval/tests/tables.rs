@@ -74,6 +74,31 @@ fn the_report_is_complete_and_a_second_run_computes_nothing() {
 }
 
 #[test]
+fn spread_tables_show_five_times_the_shapes_and_ablations_the_same_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let spread = ["--shapes", "10", "--spread", "--points", "200", "--methods", "icp,oracle"];
+    let parts = ["--parts", "main,severity,one-sided", "--out", "report"];
+    let first = run(folder.path(), &[&["tables"], &spread[..], &parts[..]].concat());
+    assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
+    let said = String::from_utf8(first.stdout).unwrap();
+    // Clean pairs of 10 shapes and 12 corruptions of 2 for each severity; then 2 shapes in all 61 groups.
+    for part in [(10 + 12 * 10), 2 * 61, 2 * 12] {
+        assert!(said.contains(&format!("{part} pairs")), "{part}: {said}");
+    }
+    let read = |name: &str| fs::read_to_string(folder.path().join("report").join(name)).unwrap();
+    let text = read("tables.md");
+    assert!(text.contains("10 shapes scored, each at one severity"), "{text}");
+    assert!(text.contains("2 shapes scored; corrupt both"), "{text}");
+    // The column `both` of the ablation is that of the severities.
+    let line = |name: &str| read(name).lines().find(|l| l.starts_with("cutout,icp")).unwrap().to_owned();
+    let (compared, severities) = (line("one-sided.csv"), line("severity-rmse_r.csv"));
+    assert_eq!(compared.split(',').nth(2), severities.split(',').nth(4));
+    assert!(!read("ranking-rmse_r.csv").contains(",,"));
+    let few = refusal(folder.path(), &["tables", "--shapes", "3", "--spread", "--methods", "oracle"]);
+    assert!(few.contains("--spread"), "{few}");
+}
+
+#[test]
 fn a_killed_run_goes_on_to_the_same_numbers() {
     let folder = tempfile::tempdir().unwrap();
     // Slow enough to be killed in the middle.

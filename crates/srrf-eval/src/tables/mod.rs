@@ -73,6 +73,14 @@ struct Evidence {
     shapes: usize,
 }
 
+impl Evidence {
+    /// All severities on the same shapes, which ablations are compared with: the main tables, where each of
+    /// their shapes is shown at every severity.
+    fn same_shapes(&self, options: &TablesOptions) -> Option<&Measured> {
+        self.parts.get("severity").or_else(|| self.parts.get("main").filter(|_| !options.spread))
+    }
+}
+
 /// Makes the report and gives the names of the files written.
 ///
 /// # Errors
@@ -116,6 +124,12 @@ struct Stage<'a> {
 }
 
 impl Stage<'_> {
+    /// The protocol of ablations at one severity.
+    fn middle(&self) -> Protocol {
+        let same = plan::same_shapes_protocol(self.options, self.shapes);
+        Protocol { severities: vec![plan::MIDDLE], ..same }
+    }
+
     fn pairs(&self, protocol: Protocol) -> Result<SynthesizedPairs, EvalError> {
         let source = data::open(self.options.data.as_deref(), protocol.shapes)?;
         SynthesizedPairs::new(source, protocol)
@@ -146,7 +160,7 @@ impl Stage<'_> {
     fn other_weights(&self, evidence: &mut Evidence, say: Listener<'_>) -> Result<(), EvalError> {
         let options = self.options;
         let main = plan::main_protocol(options, self.shapes);
-        let middle = Protocol { severities: vec![plan::MIDDLE], ..main.clone() };
+        let middle = self.middle();
         let of_srrf = |weights| MethodContext::of_srrf(weights, &options.device).weights;
         let (ddl, no_ddl) = (of_srrf(options.with_loss()), of_srrf(options.without_loss()));
         let clean = options.clean_models();
@@ -182,8 +196,7 @@ impl Stage<'_> {
         for (name, weights) in &self.options.variant {
             let context = MethodContext::of_srrf(Some(weights.clone()), &self.options.device);
             let cast = Cast::new(&NETWORK_ROWS.map(str::to_owned), &context)?;
-            let main = plan::main_protocol(self.options, self.shapes);
-            let pairs = self.pairs(Protocol { severities: vec![plan::MIDDLE], ..main })?;
+            let pairs = self.pairs(self.middle())?;
             let measured = self.score(name, &pairs, &cast.methods, cast.rows.clone(), say)?;
             evidence.cast.weights.extend(cast.weights.into_values().map(|w| (name.clone(), w)));
             evidence.variants.push((name.clone(), measured));
@@ -202,12 +215,8 @@ impl Stage<'_> {
             return Ok(());
         }
         let methods = thresholds::methods(context)?;
-        let protocol = Protocol {
-            clean: false,
-            corruptions: thresholds::CORRUPTIONS.to_vec(),
-            severities: vec![plan::MIDDLE],
-            ..plan::main_protocol(self.options, self.shapes)
-        };
+        let protocol =
+            Protocol { clean: false, corruptions: thresholds::CORRUPTIONS.to_vec(), ..self.middle() };
         let rows = methods.iter().flat_map(|(rows, _)| rows.iter().map(|r| (*r).to_owned())).collect();
         let measured = self.score("inlier thresholds", &self.pairs(protocol)?, &methods, rows, say)?;
         evidence.parts.insert("thresholds", measured);
@@ -233,8 +242,8 @@ impl Stage<'_> {
 
     /// The pairs of table 4.
     fn sampled<'a>(&self, skeletons: &'a dyn srrf_cloud::Register) -> Result<SampledPairs<'a>, EvalError> {
-        let main = plan::main_protocol(self.options, self.shapes);
-        let clean = self.pairs(Protocol { corruptions: Vec::new(), severities: Vec::new(), ..main })?;
+        let same = plan::same_shapes_protocol(self.options, self.shapes);
+        let clean = self.pairs(Protocol { corruptions: Vec::new(), severities: Vec::new(), ..same })?;
         // As many points as the skeletons of the network have, so that only the choice differs.
         let first = clean.pair(0, 0)?.pair;
         let found = skeletons.register(&first.source, &first.target).ok();

@@ -26,6 +26,11 @@ pub struct TablesOptions {
     #[arg(long, value_name = "N")]
     pub shapes: Option<usize>,
 
+    /// Each shape of the tables of models at one severity only, the severities in turn: five times the shapes in the
+    /// same time. Curves, ablations and table 4, which compare the same shapes, take a fifth of them
+    #[arg(long)]
+    pub spread: bool,
+
     /// Rows of the tables [default: the paper's methods, and ours]. Those without weights are left out,
     /// and the report says so
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
@@ -90,8 +95,9 @@ pub struct TablesOptions {
 }
 
 /// Names of the parts of the report.
-pub(crate) const PARTS: [&str; 9] = [
+pub(crate) const PARTS: [&str; 10] = [
     "main",
+    "severity",
     "clean-trained",
     "table4",
     "table5",
@@ -105,7 +111,8 @@ pub(crate) const PARTS: [&str; 9] = [
 const EXAMPLES: &str = "\
 Examples:
   srrf-eval tables                                    built-in shapes, a first look
-  srrf-eval tables --data PATH --shapes 100           100 shapes of the test split
+  srrf-eval tables --data PATH --shapes 20            20 shapes of the test split, each at all severities
+  srrf-eval tables --data PATH --shapes 100 --spread  100 shapes, each at one severity in turn
   srrf-eval tables --data PATH --methods icp,oracle,srrf --parts main,beyond";
 
 /// `NAME=PATH`.

@@ -46,12 +46,18 @@ pub(crate) struct Experiment {
 
 /// The protocol of the main tables.
 pub(crate) fn main_protocol(options: &TablesOptions, shapes: usize) -> Protocol {
+    Protocol { shapes, spread: options.spread, ..same_shapes_protocol(options, shapes) }
+}
+
+/// The protocol of what compares severities or experiments: the same shapes in all of them, a fifth of
+/// those of the main tables where these are spread over the severities.
+pub(crate) fn same_shapes_protocol(options: &TablesOptions, shapes: usize) -> Protocol {
     Protocol {
         clean: true,
         corruptions: CorruptionKind::ALL.to_vec(),
         mixtures: Vec::new(),
         severities: Severity::ALL.to_vec(),
-        shapes,
+        shapes: if options.spread { (shapes / Severity::ALL.len()).max(1) } else { shapes },
         seed: options.seed,
         pair: PairConfig { points: options.points, ..PairConfig::default() },
         dcp_poses: false,
@@ -61,20 +67,31 @@ pub(crate) fn main_protocol(options: &TablesOptions, shapes: usize) -> Protocol 
 
 /// The main experiment and the ablations of protocols that are wanted.
 pub(crate) fn experiments(options: &TablesOptions, shapes: usize, cast: &Cast) -> Vec<Experiment> {
-    let main = main_protocol(options, shapes);
-    let middle = Protocol { severities: vec![MIDDLE], ..main.clone() };
+    let same = same_shapes_protocol(options, shapes);
+    let middle = Protocol { severities: vec![MIDDLE], ..same.clone() };
     // Every point is copied at severity 5 already.
     let extendable = CorruptionKind::ALL.into_iter().filter(|k| *k != CorruptionKind::Upsampling);
     let rows = || cast.only(&ABLATION_ROWS);
     let without_oracle = rows().into_iter().filter(|row| row != ORACLE).collect();
     let all = [
-        Experiment { key: "main", title: "all corruptions", protocol: main.clone(), rows: cast.rows.clone() },
+        Experiment {
+            key: "main",
+            title: "all corruptions",
+            protocol: main_protocol(options, shapes),
+            rows: cast.rows.clone(),
+        },
+        Experiment {
+            key: "severity",
+            title: "all severities",
+            protocol: same.clone(),
+            rows: cast.rows.clone(),
+        },
         Experiment {
             key: "one-sided",
             title: "one cloud corrupted",
             protocol: Protocol {
                 clean: false,
-                pair: PairConfig { corrupt: Corrupt::Target, ..main.pair },
+                pair: PairConfig { corrupt: Corrupt::Target, ..same.pair },
                 ..middle.clone()
             },
             rows: rows(),
@@ -83,7 +100,7 @@ pub(crate) fn experiments(options: &TablesOptions, shapes: usize, cast: &Cast) -
             key: "independent",
             title: "independent sampling",
             protocol: Protocol {
-                pair: PairConfig { sampling: Sampling::Independent, ..main.pair },
+                pair: PairConfig { sampling: Sampling::Independent, ..same.pair },
                 ..middle.clone()
             },
             rows: without_oracle,
@@ -95,7 +112,7 @@ pub(crate) fn experiments(options: &TablesOptions, shapes: usize, cast: &Cast) -
                 clean: false,
                 corruptions: extendable.collect(),
                 severities: Severity::BEYOND.to_vec(),
-                ..main
+                ..same
             },
             rows: rows(),
         },
@@ -111,5 +128,7 @@ pub(crate) fn experiments(options: &TablesOptions, shapes: usize, cast: &Cast) -
             rows: rows(),
         },
     ];
-    all.into_iter().filter(|e| options.wants(e.key) && !e.rows.is_empty()).collect()
+    // Without `--spread` the main tables show the same shapes at all severities.
+    let twice = |e: &Experiment| e.key == "severity" && !options.spread && options.wants("main");
+    all.into_iter().filter(|e| options.wants(e.key) && !e.rows.is_empty() && !twice(e)).collect()
 }

@@ -29,11 +29,16 @@ pub(super) fn document(
     context: &MethodContext,
 ) -> Result<Document, EvalError> {
     let mut sections = Vec::new();
+    let same = evidence.same_shapes(options);
     if let Some(main) = evidence.parts.get("main") {
-        let pairs = stage.pairs(plan::main_protocol(options, stage.shapes))?;
         sections.push(losses_section(main));
         sections.push(main_section(main));
-        sections.push(severity_section(main)?);
+    }
+    if let Some(same) = same {
+        sections.push(severity_section(same)?);
+    }
+    if let Some(main) = evidence.parts.get("main") {
+        let pairs = stage.pairs(plan::main_protocol(options, stage.shapes))?;
         sections.push(pictures(stage, evidence, &pairs, main, context)?);
         sections.push(views(evidence, &pairs, main)?);
     }
@@ -44,8 +49,8 @@ pub(super) fn document(
         sections.push(section);
     }
     sections.push(sampling_section(stage, evidence)?);
-    sections.push(skeleton_section(evidence));
-    sections.push(ablations(evidence));
+    sections.push(skeleton_section(evidence, same));
+    sections.push(ablations(evidence, same));
     if let Some(main) = evidence.parts.get("main") {
         let mut section = Section::new("costs", "Time");
         section.sheets.push(sheets::costs(&main.summary));
@@ -112,15 +117,17 @@ fn main_section(main: &Measured) -> Section {
          a method fails counts as the identity. Recall: under 5 degrees and 0.1."
             .into(),
     );
-    section.sheets = sheets::paper_tables(&main.summary, "");
+    section.sheets.extend(sheets::rankings(&main.summary));
+    section.sheets.extend(sheets::paper_tables(&main.summary, ""));
     section.sheets.extend(sheets::symmetry(&main.summary));
     section
 }
 
-fn severity_section(main: &Measured) -> Result<Section, EvalError> {
+fn severity_section(same: &Measured) -> Result<Section, EvalError> {
     let mut section = Section::new("severity", "Error against severity");
-    section.figures = figures::severity_curves(&main.summary)?;
-    section.sheets = sheets::severities(&main.summary, "severity", true);
+    section.text.push(format!("{}; the same in every column.", same.data));
+    section.figures = figures::severity_curves(&same.summary)?;
+    section.sheets = sheets::severities(&same.summary, "severity", true);
     Ok(section)
 }
 
@@ -133,7 +140,8 @@ fn pictures(
     context: &MethodContext,
 ) -> Result<Section, EvalError> {
     let mut section = Section::new("pictures", "Pictures");
-    section.figures.extend(figures::corruption_sheet(pairs, stage.shapes / 3)?);
+    let same = stage.pairs(plan::same_shapes_protocol(stage.options, stage.shapes))?;
+    section.figures.extend(figures::corruption_sheet(&same, same.groups()[0].pairs / 3)?);
     section.figures.extend(figures::registrations(pairs, &main.outcome, &DRAWN_ROWS)?);
     if evidence.cast.method("srrf").is_some() {
         let shown = |count: usize| {
@@ -215,16 +223,16 @@ fn sampling_section(stage: &Stage<'_>, evidence: &Evidence) -> Result<Section, E
     Ok(section)
 }
 
-fn skeleton_section(evidence: &Evidence) -> Section {
+fn skeleton_section(evidence: &Evidence, same: Option<&Measured>) -> Section {
     let mut section = Section::new("table5", "Table 5: skeletons");
     let of = |part: &str| evidence.parts.get(part).map(|m| &m.summary);
-    if let Some(with) = of("with-loss").or(of("main")) {
+    if let Some(with) = of("with-loss").or(same.map(|m| &m.summary)) {
         section.sheets.extend(sheets::skeletons(with, of("without-loss")));
     }
     section
 }
 
-fn ablations(evidence: &Evidence) -> Section {
+fn ablations(evidence: &Evidence, same: Option<&Measured>) -> Section {
     let mut section = Section::new("ablations", "Ablations");
     section.text.push(
         "Dense branch, skeleton branch and fusion are rows of every table. The number of skeleton points is fixed by \
@@ -232,7 +240,6 @@ fn ablations(evidence: &Evidence) -> Section {
             .into(),
     );
     let middle = SeverityKey::One(plan::MIDDLE.get());
-    let main = evidence.parts.get("main");
     let compared = [
         (
             "one-sided",
@@ -252,27 +259,27 @@ fn ablations(evidence: &Evidence) -> Section {
         ),
     ];
     for (key, title, first, second, note) in compared {
-        if let (Some(main), Some(other)) = (main, evidence.parts.get(key)) {
+        if let (Some(same), Some(other)) = (same, evidence.parts.get(key)) {
             let columns = [
-                Column { name: first, summary: &main.summary, severity: middle },
+                Column { name: first, summary: &same.summary, severity: middle },
                 Column { name: second, summary: &other.summary, severity: middle },
             ];
             section.sheets.extend(sheets::compare(key, title, note, &columns));
         }
     }
-    if let (Some(main), Some(beyond)) = (main, evidence.parts.get("beyond")) {
+    if let (Some(same), Some(beyond)) = (same, evidence.parts.get("beyond")) {
         let at = |summary, severity| Column {
             name: ["s = 5", "s = 6", "s = 7"][usize::from(severity) - 5],
             summary,
             severity: SeverityKey::One(severity),
         };
-        let columns = [at(&main.summary, 5), at(&beyond.summary, 6), at(&beyond.summary, 7)];
+        let columns = [at(&same.summary, 5), at(&beyond.summary, 6), at(&beyond.summary, 7)];
         let note = "Training knew severities 1 to 5. Beyond, every parameter goes on by its step from 4 to 5; \
                     upsampling, which copies every point at 5, has no more to copy.";
         section.sheets.extend(sheets::compare("beyond", "Beyond the severities of training", note, &columns));
     }
-    if let (Some(main), false) = (main, evidence.variants.is_empty()) {
-        let mut columns = vec![Column { name: "default", summary: &main.summary, severity: middle }];
+    if let (Some(same), false) = (same, evidence.variants.is_empty()) {
+        let mut columns = vec![Column { name: "default", summary: &same.summary, severity: middle }];
         for (name, measured) in &evidence.variants {
             columns.push(Column { name, summary: &measured.summary, severity: middle });
         }

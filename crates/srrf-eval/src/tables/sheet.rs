@@ -46,6 +46,20 @@ impl From<&str> for Cell {
     }
 }
 
+/// Marks the best of several numbers, and what prints like it.
+fn mark_best(mut cells: Vec<&mut Cell>, more_is_better: bool) {
+    let better = |a: f64, b: f64| if more_is_better { a > b } else { a < b };
+    let numbers: Vec<f64> = cells.iter().filter_map(|cell| cell.value()).collect();
+    let Some(best) = numbers.iter().copied().reduce(|a, b| if better(b, a) { b } else { a }) else { return };
+    for cell in cells.iter_mut().filter(|_| numbers.len() > 1) {
+        if let Cell::Number(value, digits) = **cell
+            && format!("{value:.digits$}") == format!("{best:.digits$}")
+        {
+            **cell = Cell::Best(value, digits);
+        }
+    }
+}
+
 /// A table.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sheet {
@@ -71,24 +85,16 @@ impl Sheet {
     /// Marks the best number of each of `columns` among the rows `from..` for which `competes` holds;
     /// the flag of a column says whether more is better. What prints alike is equally good.
     pub fn mark_best(&mut self, from: usize, columns: &[(usize, bool)], competes: impl Fn(&[Cell]) -> bool) {
-        let rows = &mut self.rows[from..];
         for &(column, more_is_better) in columns {
-            let better = |a: f64, b: f64| if more_is_better { a > b } else { a < b };
-            let contenders: Vec<Cell> =
-                rows.iter().filter(|r| competes(r)).map(|r| r[column].clone()).collect();
-            let numbers = contenders.iter().filter_map(Cell::value);
-            if numbers.clone().count() < 2 {
-                continue;
-            }
-            let Some(best) = numbers.reduce(|a, b| if better(b, a) { b } else { a }) else { continue };
-            for row in rows.iter_mut().filter(|r| competes(r)) {
-                if let Cell::Number(value, digits) = row[column]
-                    && format!("{value:.digits$}") == format!("{best:.digits$}")
-                {
-                    row[column] = Cell::Best(value, digits);
-                }
-            }
+            let rows = self.rows[from..].iter_mut().filter(|row| competes(row));
+            mark_best(rows.map(|row| &mut row[column]).collect(), more_is_better);
         }
+    }
+
+    /// Marks the best number of the row `row` among the columns for which `competes` holds.
+    pub fn mark_best_of_row(&mut self, row: usize, more_is_better: bool, competes: impl Fn(usize) -> bool) {
+        let cells = self.rows[row].iter_mut().enumerate().filter(|(column, _)| competes(*column));
+        mark_best(cells.map(|(_, cell)| cell).collect(), more_is_better);
     }
 
     /// As Markdown, under a heading of the third level.

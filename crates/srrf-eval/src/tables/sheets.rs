@@ -63,6 +63,10 @@ Mean of the severities 1 to 5. Degrees; translations in the unit of the clouds. 
 paper's own numbers (its MSE is the square of its RMSE); its severities, and much else, are not known, so they \
 are no target. In bold the best of ours beside the oracle, which fits a pose to perfect correspondences.";
 
+const RANKING_NOTE: &str = "\
+Mean of the severities; the last line is the mean of the corruptions. In bold the best beside the oracle, which fits \
+a pose to perfect correspondences.";
+
 const CLEAN_NOTE: &str = "\
 Degrees; translations in the unit of the clouds. The paper has no such table. In bold the best beside the oracle, \
 which fits a pose to perfect correspondences.";
@@ -70,6 +74,37 @@ which fits a pose to perfect correspondences.";
 /// Numbers where less is better in [`PAPER_HEAD`], then recall.
 const PAPER_BEST: [(usize, bool); 8] =
     [(2, false), (3, false), (4, false), (5, false), (6, false), (7, false), (8, false), (9, true)];
+
+/// The rotation errors at a glance: a line for each corruption, a column for each method, then the mean of the
+/// corruptions.
+pub(crate) fn rankings(summary: &Summary) -> Vec<Sheet> {
+    let methods = summary.methods();
+    let head: Vec<&str> = ["corruption"].into_iter().chain(methods.iter().copied()).collect();
+    let sheet = |quantity: &Quantity| {
+        let mut sheet = Sheet::new(&format!("ranking-{}", quantity.key), quantity.title, RANKING_NOTE, &head);
+        let value = |row: &SummaryRow| (quantity.value)(&row.scores).map(|v| v * quantity.scale);
+        let line = |name: &str, values: Vec<Option<f64>>| -> Vec<Cell> {
+            let numbers = values.into_iter().map(|v| Cell::number(v, quantity.digits));
+            [name.into()].into_iter().chain(numbers).collect()
+        };
+        for corruption in summary.corruptions() {
+            let cell = |method: &&str| summary.get(corruption, SeverityKey::Mean, method).and_then(value);
+            sheet.rows.push(line(corruption, methods.iter().map(cell).collect()));
+        }
+        let means: Vec<Option<f64>> = methods.iter().map(|m| summary.over_corruptions(m, value)).collect();
+        if means.iter().any(Option::is_some) {
+            sheet.rows.push(line("mean of corruptions", means));
+        }
+        for row in 0..sheet.rows.len() {
+            sheet.mark_best_of_row(row, quantity.more_is_better, |column| {
+                column > 0 && methods[column - 1] != ORACLE
+            });
+        }
+        sheet
+    };
+    let shown = QUANTITIES.iter().filter(|q| ["rmse_r", "mae_r"].contains(&q.key));
+    shown.map(sheet).filter(|s| !s.rows.is_empty()).collect()
+}
 
 /// Tables 1 to 3 with clean pairs before them. `suffix` tells the tables of several models apart.
 pub(crate) fn paper_tables(summary: &Summary, suffix: &str) -> Vec<Sheet> {
@@ -353,6 +388,23 @@ mod tests {
         );
         assert_eq!((&table.rows[2][1], &table.rows[2][3]), (&"pointnetlk".into(), &Cell::None));
         assert!(table.rows.iter().all(|r| r.len() == table.head.len()));
+    }
+
+    #[test]
+    fn rankings_have_a_column_for_each_method_and_mark_the_best_of_a_line() {
+        let sheets = rankings(&summary());
+        assert_eq!(
+            sheets.iter().map(|s| s.key.as_str()).collect::<Vec<_>>(),
+            ["ranking-rmse_r", "ranking-mae_r"]
+        );
+        assert_eq!(sheets[0].head, ["corruption", "icp", "srrf"]);
+        // Both are exact on clean pairs; one corruption has no mean of several.
+        assert_eq!(sheets[0].rows[0], ["clean".into(), Cell::Best(0.0, 2), Cell::Best(0.0, 2)]);
+        let [name, Cell::Best(icp, 2), Cell::Number(srrf, 2)] = &sheets[0].rows[1][..] else {
+            panic!("{:?}", sheets[0].rows[1])
+        };
+        assert_eq!((name, sheets[0].rows.len()), (&"cutout".into(), 2));
+        assert!((10.0 * icp - srrf).abs() < 1e-9);
     }
 
     #[test]
