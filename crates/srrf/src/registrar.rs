@@ -158,6 +158,11 @@ impl Registrar {
             clock.lap("network");
         }
         let mut doubtful: Vec<Start> = Vec::new();
+        let mut no_global = None;
+        let wider = || -> Vec<Start> {
+            // What they do not find, the other starts have to do without.
+            WIDE_RADII.into_iter().flat_map(|r| self.global(&centred, target, r, &given)).flatten().collect()
+        };
         match self.options.method {
             Method::Auto | Method::FpfhRansac => {
                 let radius = FpfhRansacConfig::default().feature_voxels;
@@ -166,7 +171,7 @@ impl Registrar {
                         doubtful = poses.split_off(FIRST.min(poses.len()));
                         starts.extend(poses);
                     }
-                    Err(e) => warnings.push(format!("FPFH with RANSAC found no pose: {e}.")),
+                    Err(e) => no_global = Some(format!("FPFH with RANSAC found no pose: {e}.")),
                 }
                 clock.lap("fpfh-ransac");
             }
@@ -181,17 +186,23 @@ impl Registrar {
         if matches!(self.options.method, Method::Given | Method::Auto) {
             starts.push(("given".to_owned(), given));
         }
+        let asks_global = matches!(self.options.method, Method::Auto | Method::FpfhRansac);
+        let waits_for_wider = asks_global && !starts.is_empty();
+        if asks_global && starts.is_empty() {
+            starts = wider();
+            clock.lap("fpfh-ransac, wider");
+        }
         if starts.is_empty() {
+            warnings.extend(no_global);
             return Err(Error::NoPose(warnings.join(" ")));
         }
         let (mut best, mut probability) = self.best_with(&mut search, &starts)?;
         clock.lap("refine");
 
         // The second round, where the first left doubt: less likely poses of FPFH with RANSAC, and wider features.
-        if matches!(self.options.method, Method::Auto | Method::FpfhRansac) && probability < SURE {
-            let wide = WIDE_RADII.map(|radius| self.global(&centred, target, radius, &given));
-            // What they do not find, the starts so far have to do without.
-            doubtful.extend(wide.into_iter().flatten().flatten());
+        if waits_for_wider && probability < SURE {
+            doubtful.extend(wider());
+            no_global = no_global.filter(|_| doubtful.is_empty());
             clock.lap("fpfh-ransac, wider");
             (best, probability) = self.best_with(&mut search, &doubtful)?;
             clock.lap("refine, wider");
@@ -208,6 +219,7 @@ impl Registrar {
             clock.lap("refine again");
         }
 
+        warnings.extend(no_global.filter(|_| waits_for_wider));
         let abstain = probability < self.options.abstain_below;
         if abstain {
             warnings.push(format!(

@@ -4,6 +4,7 @@
 mod common;
 
 use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use srrf::{Method, Options, Outcome, Registrar};
 use srrf_cloud::{EulerXyz, PointCloud, Rigid};
 
@@ -45,4 +46,27 @@ fn doubt_asks_for_more_starts() {
     stages.dedup();
     assert_eq!(stages.len(), count, "{stages:?}");
     assert!(doubtful.refinement.unwrap().starts.len() > 20);
+}
+
+/// A cloud of 16 random points, and itself with noise.
+fn few_points(seed: u64) -> (PointCloud, PointCloud) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = || -> f64 { (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0 };
+    let source: Vec<[f64; 3]> = (0..16).map(|_| [normal(), 0.7 * normal(), 0.4 * normal()]).collect();
+    let target = source.iter().map(|p| p.map(|c| c + 0.07 * normal())).collect();
+    (PointCloud::new(source).unwrap(), PointCloud::new(target).unwrap())
+}
+
+#[test]
+fn where_the_first_features_find_nothing_wider_ones_are_tried_at_once() {
+    let registrar = Registrar::new(Options { method: Method::FpfhRansac, ..Options::default() }).unwrap();
+    let tried_at_once = (0..16).filter(|seed| {
+        let (source, target) = few_points(*seed);
+        let Ok(found) = registrar.register(&source, &target) else { return false };
+        let stages = stages(&found);
+        let at = |stage: &str| stages.iter().position(|s| *s == stage);
+        assert!(!found.warnings.iter().any(|w| w.starts_with("FPFH")), "{:?}", found.warnings);
+        at(WIDER).is_some_and(|wider| Some(wider) < at("refine"))
+    });
+    assert!(tried_at_once.count() > 0);
 }
