@@ -20,12 +20,12 @@ fn configs() -> PathBuf {
     Path::new(&std::env::var("CARGO_MANIFEST_DIR").unwrap()).join("../../configs")
 }
 
-/// A configuration has the pairs and the validation of SRRF's, and weights that are not too many.
-fn belongs<C: LearnedConfig>(name: &str) {
-    let path = configs().join(format!("baselines/{name}.toml"));
+/// The configuration that trains `name` has the pairs and the validation of one of SRRF's, and weights that are not too many.
+fn belongs<C: LearnedConfig>(name: &str, file: &str, srrf: &str) {
+    let path = configs().join(format!("baselines/{file}.toml"));
     assert_eq!(method_of(&path).unwrap(), C::NAME);
     let ours = TrainConfig::<Baseline<C>>::read(&path).unwrap();
-    let srrf = <TrainConfig>::read(&configs().join("modelnet-small-2.toml")).unwrap();
+    let srrf = <TrainConfig>::read(&configs().join(format!("{srrf}.toml"))).unwrap();
     assert_eq!((&ours.name, ours.seed), (&name.to_string(), srrf.seed));
     assert_eq!((&ours.data, &ours.draw, &ours.pairs), (&srrf.data, &srrf.draw, &srrf.pairs), "{name}");
     assert_eq!(ours.keep, srrf.keep, "{name}");
@@ -36,13 +36,15 @@ fn belongs<C: LearnedConfig>(name: &str) {
 
 #[test]
 fn every_configuration_has_the_pairs_of_srrf() {
-    belongs::<DcpConfig>("dcp");
-    belongs::<DcpConfig>("dcp-v1");
-    belongs::<PointNetLkConfig>("pointnetlk");
-    belongs::<RgmConfig>("rgm");
-    belongs::<PanetConfig>("panet");
-    belongs::<EquiGsprConfig>("equi-gspr");
-    assert_eq!(std::fs::read_dir(configs().join("baselines")).unwrap().count(), 6);
+    let first = "modelnet-small-2";
+    belongs::<DcpConfig>("dcp", "dcp", first);
+    belongs::<DcpConfig>("dcp-v1", "dcp-v1", first);
+    belongs::<PointNetLkConfig>("pointnetlk", "pointnetlk", first);
+    belongs::<RgmConfig>("rgm", "rgm", first);
+    belongs::<RgmConfig>("rgm", "rgm-2", "modelnet-equal-2");
+    belongs::<PanetConfig>("panet", "panet", first);
+    belongs::<EquiGsprConfig>("equi-gspr", "equi-gspr", first);
+    assert_eq!(std::fs::read_dir(configs().join("baselines")).unwrap().count(), 7);
     assert_eq!(method_of(&configs().join("smoke.toml")).unwrap(), "srrf");
 }
 
