@@ -94,6 +94,11 @@ fn spread_tables_show_five_times_the_shapes_and_ablations_the_same_ones() {
     let (compared, severities) = (line("one-sided.csv"), line("severity-rmse_r.csv"));
     assert_eq!(compared.split(',').nth(2), severities.split(',').nth(4));
     assert!(!read("ranking-rmse_r.csv").contains(",,"));
+    // Without the severities there is nothing to compare with, and the report says so.
+    let alone = [&["tables"], &spread[..], &["--parts", "one-sided", "--out", "alone"]].concat();
+    assert!(run(folder.path(), &alone).status.success());
+    let text = fs::read_to_string(folder.path().join("alone/tables.md")).unwrap();
+    assert!(text.contains("Left out: one-sided: it is compared with the part `severity`"), "{text}");
     let few = refusal(folder.path(), &["tables", "--shapes", "3", "--spread", "--methods", "oracle"]);
     assert!(few.contains("--spread"), "{few}");
 }

@@ -107,6 +107,12 @@ pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, E
         parts.insert(experiment.key, measured);
     }
     let mut evidence = Evidence { parts, variants: Vec::new(), cast, missing: Vec::new(), shapes };
+    if evidence.same_shapes(options).is_none() {
+        let compared = plan::COMPARED.iter().filter(|part| evidence.parts.contains_key(*part));
+        let base = if options.spread { "severity" } else { "main" };
+        let reason = format!("it is compared with the part `{base}`, which --parts leaves out");
+        evidence.missing.extend(compared.map(|part| ((*part).to_owned(), reason.clone())));
+    }
     stage.other_weights(&mut evidence, say)?;
     stage.variants(&mut evidence, say)?;
     stage.thresholds(&mut evidence, &context, say)?;

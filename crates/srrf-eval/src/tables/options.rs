@@ -27,7 +27,7 @@ pub struct TablesOptions {
     pub shapes: Option<usize>,
 
     /// Each shape of the tables of models at one severity only, the severities in turn: five times the shapes in the
-    /// same time. Curves, ablations and table 4, which compare the same shapes, take a fifth of them
+    /// same time. Curves, ablations and tables 4 and 5, which compare the same shapes, take a fifth of them
     #[arg(long)]
     pub spread: bool,
 

@@ -14,6 +14,9 @@ pub(crate) const MIDDLE: Severity = Severity::ALL[2];
 const ABLATION_ROWS: [&str; 7] =
     ["icp", "fpfh-ransac", ORACLE, "srrf-dense", "srrf-skeleton", "srrf", "srrf+refine"];
 
+/// Experiments whose tables compare them with all severities on the same shapes.
+pub(crate) const COMPARED: [&str; 3] = ["one-sided", "independent", "beyond"];
+
 /// Mixtures that are scored: two corruptions of different families at once, and one of each family in
 /// half of the cloud.
 pub(crate) const MIXTURES: [Mixture; 10] = {
