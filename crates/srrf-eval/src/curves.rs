@@ -52,7 +52,7 @@ pub(crate) fn svg(quantity: &Quantity, summary: &Summary) -> Result<Option<Strin
         points
             .filter_map(|(corruption, severity)| {
                 let row = summary.get(corruption, SeverityKey::One(severity), method)?;
-                Some((f64::from(severity), (quantity.value)(&row.scores)? * quantity.scale))
+                Some((f64::from(severity), quantity.shown(&row.scores)?))
             })
             .collect()
     };

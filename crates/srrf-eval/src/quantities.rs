@@ -97,10 +97,15 @@ pub(crate) const QUANTITIES: [Quantity; 8] = [
 ];
 
 impl Quantity {
-    /// The value as printed; `-` where there is none.
+    /// The number that is shown, if there is one: the value times the scale.
+    pub fn shown(&self, scores: &Scores) -> Option<f64> {
+        (self.value)(scores).map(|value| value * self.scale)
+    }
+
+    /// The number as printed; `-` where there is none.
     pub fn format(&self, scores: Option<&Scores>) -> String {
-        match scores.and_then(self.value) {
-            Some(value) => format!("{:.*}", self.digits, value * self.scale),
+        match scores.and_then(|scores| self.shown(scores)) {
+            Some(number) => format!("{number:.*}", self.digits),
             None => "-".into(),
         }
     }

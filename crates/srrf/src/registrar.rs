@@ -186,10 +186,10 @@ impl Registrar {
         if matches!(self.options.method, Method::Given | Method::Auto) {
             starts.push(("given".to_owned(), given));
         }
-        let asks_global = matches!(self.options.method, Method::Auto | Method::FpfhRansac);
-        let waits_for_wider = asks_global && !starts.is_empty();
-        if asks_global && starts.is_empty() {
+        let mut wider_left = matches!(self.options.method, Method::Auto | Method::FpfhRansac);
+        if wider_left && starts.is_empty() {
             starts = wider();
+            (wider_left, no_global) = (false, no_global.filter(|_| starts.is_empty()));
             clock.lap("fpfh-ransac, wider");
         }
         if starts.is_empty() {
@@ -200,7 +200,7 @@ impl Registrar {
         clock.lap("refine");
 
         // The second round, where the first left doubt: less likely poses of FPFH with RANSAC, and wider features.
-        if waits_for_wider && probability < SURE {
+        if wider_left && probability < SURE {
             doubtful.extend(wider());
             no_global = no_global.filter(|_| doubtful.is_empty());
             clock.lap("fpfh-ransac, wider");
@@ -219,7 +219,7 @@ impl Registrar {
             clock.lap("refine again");
         }
 
-        warnings.extend(no_global.filter(|_| waits_for_wider));
+        warnings.extend(no_global);
         let abstain = probability < self.options.abstain_below;
         if abstain {
             warnings.push(format!(

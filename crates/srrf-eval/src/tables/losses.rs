@@ -40,10 +40,7 @@ pub(crate) fn losses(summary: &Summary) -> Vec<String> {
 
 /// A sentence where another method is better than `ours`.
 fn against_others(summary: &Summary, quantity: &Quantity, corruption: &str, ours: &str) -> Option<String> {
-    let value = |method: &str| {
-        let row = summary.get(corruption, SeverityKey::Mean, method)?;
-        Some((quantity.value)(&row.scores)? * quantity.scale)
-    };
+    let value = |method: &str| quantity.shown(&summary.get(corruption, SeverityKey::Mean, method)?.scores);
     let mine = value(ours)?;
     let printed = |v: f64| format!("{v:.*}", quantity.digits);
     let better =

@@ -108,10 +108,11 @@ pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, E
     }
     let mut evidence = Evidence { parts, variants: Vec::new(), cast, missing: Vec::new(), shapes };
     if evidence.same_shapes(options).is_none() {
-        let compared = plan::COMPARED.iter().filter(|part| evidence.parts.contains_key(*part));
+        let parts = plan::COMPARED.into_iter().filter(|part| evidence.parts.contains_key(part));
+        let compared = parts.chain(options.variant.iter().map(|(name, _)| name.as_str()));
         let base = if options.spread { "severity" } else { "main" };
         let reason = format!("it is compared with the part `{base}`, which --parts leaves out");
-        evidence.missing.extend(compared.map(|part| ((*part).to_owned(), reason.clone())));
+        evidence.missing.extend(compared.map(|part| (part.to_owned(), reason.clone())));
     }
     stage.other_weights(&mut evidence, say)?;
     stage.variants(&mut evidence, say)?;

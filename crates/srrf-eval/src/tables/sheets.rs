@@ -82,7 +82,7 @@ pub(crate) fn rankings(summary: &Summary) -> Vec<Sheet> {
     let head: Vec<&str> = ["corruption"].into_iter().chain(methods.iter().copied()).collect();
     let sheet = |quantity: &Quantity| {
         let mut sheet = Sheet::new(&format!("ranking-{}", quantity.key), quantity.title, RANKING_NOTE, &head);
-        let value = |row: &SummaryRow| (quantity.value)(&row.scores).map(|v| v * quantity.scale);
+        let value = |row: &SummaryRow| quantity.shown(&row.scores);
         let line = |name: &str, values: Vec<Option<f64>>| -> Vec<Cell> {
             let numbers = values.into_iter().map(|v| Cell::number(v, quantity.digits));
             [name.into()].into_iter().chain(numbers).collect()
@@ -200,8 +200,8 @@ pub(crate) fn severities(summary: &Summary, key: &str, with_mean: bool) -> Vec<S
         for corruption in summary.corruptions() {
             for method in summary.methods() {
                 let value = |key: &SeverityKey| {
-                    let scores = summary.get(corruption, *key, method).map(|r| &r.scores);
-                    Cell::number(scores.and_then(quantity.value).map(|v| v * quantity.scale), quantity.digits)
+                    let row = summary.get(corruption, *key, method);
+                    Cell::number(row.and_then(|r| quantity.shown(&r.scores)), quantity.digits)
                 };
                 let cells: Vec<Cell> = keys.iter().map(value).collect();
                 if cells[..severities.len()].iter().any(|c| *c != Cell::None) {
@@ -247,8 +247,7 @@ pub(crate) fn compare(key: &str, title: &str, note: &str, columns: &[Column<'_>]
                     // Clean pairs have no severity.
                     let keys = [column.severity, SeverityKey::One(0)];
                     let row = keys.iter().find_map(|&k| column.summary.get(corruption, k, method));
-                    let value = row.and_then(|r| (quantity.value)(&r.scores));
-                    cells.push(Cell::number(value.map(|v| v * quantity.scale), quantity.digits));
+                    cells.push(Cell::number(row.and_then(|r| quantity.shown(&r.scores)), quantity.digits));
                 }
             }
             sheet.rows.push(cells);
