@@ -32,8 +32,8 @@ fi
 # SRRF_STEP_TIME names a program that is built already.
 program=${SRRF_STEP_TIME:-}
 if [ -z "$program" ]; then
-    cargo build --quiet -p srrf-train --example step_time
-    program=${CARGO_TARGET_DIR:-target}/debug/examples/step_time
+    cargo build --quiet -p srrf-lab --bin step_time
+    program=${CARGO_TARGET_DIR:-target}/debug/step_time
 fi
 
 "$python" scripts/speed_reference.py --check >&2

@@ -1,14 +1,6 @@
-//! Registration methods behind the [`Register`](srrf_cloud::Register) seam: one module each.
+//! The learned methods that the paper compares, behind the [`Register`](srrf_cloud::Register) seam: one module each.
 //!
-//! Classical:
-//!
-//! - [`Identity`]: moves nothing; the chance level.
-//! - [`Icp`]: iterative closest point, point to point.
-//! - [`IcpPlane`], [`IcpTrimmed`], [`IcpRobust`]: its variants with planes, with the nearest matches only, with
-//!   a robust kernel.
-//! - [`FpfhRansac`], [`Fgr`]: global methods, which need no start, with refinement behind them.
-//!
-//! Learned, each a [`LearnedConfig`] that `srrf-train` trains, and [`LearnedRegister`] runs:
+//! Each is a [`LearnedConfig`] that `srrf-train` trains, and [`LearnedRegister`] runs:
 //!
 //! - [`PointNetLk`]: Lucas-Kanade on a PointNet's feature, with both Jacobians.
 //! - [`Dcp`]: deep closest point, v1 and v2.
@@ -20,36 +12,18 @@
 //! take their shared parts from `srrf-model`: neighbours, attention, soft matching, the SVD head. What
 //! they have in common beyond that is in `dgcnn` and `pre_norm`.
 
-mod correspond;
 mod dcp;
 mod dgcnn;
 mod equi_gspr;
-mod fgr;
-mod fpfh;
-mod fpfh_ransac;
-mod icp;
-mod icp_loop;
-mod icp_plane;
-mod icp_robust;
-mod icp_trimmed;
-mod identity;
 mod learned;
 mod panet;
 mod pointnetlk;
 mod pre_norm;
-mod ransac;
 mod rgm;
 mod se3;
 
 pub use dcp::{Dcp, DcpConfig, DcpLosses, DcpVersion};
 pub use equi_gspr::{EquiGspr, EquiGsprConfig, EquiGsprLosses, PutativeMatches};
-pub use fgr::{Fgr, FgrConfig};
-pub use fpfh_ransac::{FpfhRansac, FpfhRansacConfig, Hypotheses};
-pub use icp::{Icp, IcpConfig};
-pub use icp_plane::{IcpPlane, IcpPlaneConfig};
-pub use icp_robust::{IcpRobust, IcpRobustConfig};
-pub use icp_trimmed::{IcpTrimmed, IcpTrimmedConfig};
-pub use identity::Identity;
 pub use learned::{LearnedConfig, LearnedRegister, Lesson, Pose, embedded};
 pub use panet::{Panet, PanetConfig, PanetLosses};
 pub use pointnetlk::{LkJacobian, PointNetLk, PointNetLkConfig, PointNetLkLosses};

@@ -8,7 +8,7 @@ use srrf_baselines::{
     embedded,
 };
 use srrf_cloud::Register;
-use srrf_cloud::shapes::ProceduralShapes;
+use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{Pair, PairConfig, PairSynthesizer, PoseDraw, Stream};
 use srrf_model::weights::parse;
 

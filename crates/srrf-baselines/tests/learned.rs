@@ -11,9 +11,9 @@ use srrf_baselines::{
     DcpConfig, DcpLosses, DcpVersion, EquiGsprConfig, EquiGsprLosses, LearnedConfig, LearnedRegister, Lesson,
     LkJacobian, PanetConfig, PanetLosses, PointNetLkConfig, PointNetLkLosses, RgmConfig, RgmLosses,
 };
-use srrf_cloud::shapes::ProceduralShapes;
-use srrf_cloud::source::ShapeSource;
 use srrf_cloud::{EulerXyz, PointCloud, Register, Rigid};
+use srrf_corrupt::datasets::ShapeSource;
+use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_model::{NetworkConfig, PairBatch, init, weights};
 
 const POINTS: usize = 97;

@@ -1,4 +1,4 @@
-//! The ground floor of SRRF: point clouds, rigid poses, neighbours, data sources, and the seam
+//! The ground floor of SRRF: point clouds, rigid poses, neighbours, files, and the seam
 //! [`Register`] that every registration method implements. No tensors live here.
 //!
 //! Coordinates are `f64` throughout, in the unit of the input. Poses carry their frames in their
@@ -14,8 +14,6 @@ mod normals;
 pub mod profile;
 mod register;
 mod rigid;
-pub mod shapes;
-pub mod source;
 mod triangles;
 mod voxel;
 
@@ -24,6 +22,9 @@ pub use euler::EulerXyz;
 pub use fps::farthest_point_sampling;
 pub use neighbours::KnnIndex;
 pub use normals::estimate_normals;
-pub use register::{Branch, Register, RegisterError, Registration, Skeleton, Skeletons, SoftMatch};
+pub use register::{
+    Branch, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, SoftMatch,
+};
 pub use rigid::Rigid;
+pub use triangles::Triangles;
 pub use voxel::{VoxelError, point_spacing, spacing_of, voxel_downsample};

@@ -71,6 +71,20 @@ pub struct Registration {
     pub skeletons: Option<Skeletons>,
     /// Soft matches behind the pose, from methods that make them.
     pub matches: Vec<SoftMatch>,
+    /// Weight of the dense branch in the fused pose, in [0, 1], from methods that fuse two branches: the number that the pose was
+    /// made with.
+    pub lambda: Option<f64>,
+    /// How sure the method is of its pose, where it says so.
+    pub certainty: Option<Certainty>,
+}
+
+/// What a method says of its own pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Certainty {
+    /// Probability that the pose is right, in [0, 1].
+    pub probability: f64,
+    /// Whether that is too little to rely on the pose.
+    pub abstain: bool,
 }
 
 impl Registration {
@@ -83,6 +97,8 @@ impl Registration {
             branches: Vec::new(),
             skeletons: None,
             matches: Vec::new(),
+            lambda: None,
+            certainty: None,
         }
     }
 

@@ -5,7 +5,7 @@ use rand::{Rng, RngExt};
 
 /// Triangles with their running area.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Triangles {
+pub struct Triangles {
     corners: Vec<[Vector3<f64>; 3]>,
     running_area: Vec<f64>,
 }

@@ -10,8 +10,8 @@
 use divan::{Bencher, black_box};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
-use srrf_cloud::shapes::ProceduralShapes;
-use srrf_cloud::source::ShapeSource;
+use srrf_corrupt::datasets::ShapeSource;
+use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{CorruptionKind, Severity, Variants, corruption};
 
 fn main() {

@@ -15,8 +15,8 @@ use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use serde_json::{Map, json};
 use srrf_cloud::PointCloud;
-use srrf_cloud::shapes::ProceduralShapes;
-use srrf_cloud::source::ShapeSource;
+use srrf_corrupt::datasets::ShapeSource;
+use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{CorruptionKind, Severity, Variants, corruption};
 
 #[derive(Parser)]

@@ -7,7 +7,7 @@
 //! and defaults to the text.
 //!
 //! ```
-//! use srrf_cloud::{shapes::ProceduralShapes, source::ShapeSource};
+//! use srrf_corrupt::{shapes::ProceduralShapes, datasets::ShapeSource};
 //! use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream, oracle_pose};
 //!
 //! let shapes = ProceduralShapes::new(7, 3, None)?;
@@ -24,12 +24,14 @@
 mod corruption;
 pub mod corruptions;
 pub mod crop;
+pub mod datasets;
 mod kind;
 mod mixture;
 mod normalize;
 mod pair;
 pub mod parameters;
 mod severity;
+pub mod shapes;
 mod variants;
 
 pub use corruption::{CorruptError, Corrupted, Corruption, corruption};

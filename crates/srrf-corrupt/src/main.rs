@@ -5,9 +5,10 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use rand::{SeedableRng, rngs::ChaCha8Rng, seq::index};
+use srrf_cloud::PointCloud;
 use srrf_cloud::io::{write_atomically, write_cloud};
-use srrf_cloud::{PointCloud, shapes::ProceduralShapes, source::ShapeSource};
 use srrf_corrupt::{Corrupted, corruption};
+use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
 
 mod canvas;
 mod cli;

@@ -4,8 +4,8 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr, reason = "helpers of tests")]
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-use srrf_cloud::source::{ShapeSource, SourceError, Split, default_data_path, open};
 use srrf_cloud::{EulerXyz, PointCloud};
+use srrf_corrupt::datasets::{ShapeSource, SourceError, Split, default_data_path, open};
 use srrf_corrupt::{
     Corrupt, CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream, oracle_pose,
 };

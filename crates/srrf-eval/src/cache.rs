@@ -181,7 +181,7 @@ fn unhex(digits: &[u8]) -> Option<Key> {
 
 #[cfg(test)]
 mod tests {
-    use srrf_baselines::Identity;
+    use srrf_classical::Identity;
     use srrf_cloud::{PointCloud, Registration, Rigid};
     use srrf_corrupt::{Bases, Label, PairConfig, PairSynthesizer, PoseDraw, Stream};
 

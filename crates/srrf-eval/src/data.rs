@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use srrf_cloud::shapes::ProceduralShapes;
-use srrf_cloud::source::{self, ShapeSource, Split};
+use srrf_corrupt::datasets::{self, ShapeSource, Split};
+use srrf_corrupt::shapes::ProceduralShapes;
 
 use crate::EvalError;
 
@@ -17,13 +17,13 @@ pub const TEST_SHAPES_SEED: u64 = 0x7E57_5EED;
 /// [`EvalError::Data`] names the path, where it came from, what was looked for, and the command
 /// that works without data.
 pub fn open(path: Option<&Path>, shapes: usize) -> Result<Box<dyn ShapeSource>, EvalError> {
-    let (path, origin): (PathBuf, _) = match (path, source::default_data_path()) {
+    let (path, origin): (PathBuf, _) = match (path, datasets::default_data_path()) {
         (Some(path), _) => (path.to_owned(), "The path was given by --data."),
         (None, Some(path)) => (path, "The path was given by the environment variable SRRF_DATA."),
         (None, None) => return procedural(shapes),
     };
     let named = |source| EvalError::Data { origin: origin.into(), source: Box::new(source) };
-    source::open(&path, Split::Test).map_err(named)
+    datasets::open(&path, Split::Test).map_err(named)
 }
 
 /// `shapes` procedural shapes for scoring.

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use srrf_cloud::source::SourceError;
+use srrf_corrupt::datasets::SourceError;
 use srrf_corrupt::{SeverityOutOfRange, UnknownCorruption};
 
 use crate::arrays::ArrayError;

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use srrf_baselines::{
-    DcpConfig, EquiGsprConfig, Fgr, FpfhRansac, Icp, IcpConfig, IcpPlane, IcpRobust, IcpTrimmed, Identity,
-    LearnedConfig, LearnedRegister, PanetConfig, PointNetLkConfig, RgmConfig,
+    DcpConfig, EquiGsprConfig, LearnedConfig, LearnedRegister, PanetConfig, PointNetLkConfig, RgmConfig,
 };
+use srrf_classical::{Fgr, FpfhRansac, Icp, IcpConfig, IcpPlane, IcpRobust, IcpTrimmed, Identity};
 use srrf_cloud::Register;
 use srrf_model::weights::{self, LoadedModel};
 use srrf_model::{BranchKind, NetworkConfig, SrrfRegister, embedded};

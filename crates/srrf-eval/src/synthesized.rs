@@ -1,7 +1,7 @@
 //! Pairs made from shapes: clean ones, and each corruption at each severity.
 
 use serde::Serialize;
-use srrf_cloud::source::ShapeSource;
+use srrf_corrupt::datasets::ShapeSource;
 use srrf_corrupt::{
     CorruptionKind, Mixture, Normalize, PairConfig, PairSynthesizer, PoseDraw, Purpose, RotationRange,
     Sampling, Severity, Stream,

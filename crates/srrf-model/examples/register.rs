@@ -2,7 +2,8 @@
 #![allow(clippy::print_stdout, reason = "an example shows what it found")]
 
 use rand::{SeedableRng, rngs::ChaCha8Rng};
-use srrf_cloud::{EulerXyz, Register, Rigid, shapes::ProceduralShapes, source::ShapeSource};
+use srrf_cloud::{EulerXyz, Register, Rigid};
+use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
 use srrf_model::{SrrfRegister, device, embedded};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

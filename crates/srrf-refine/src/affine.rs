@@ -145,7 +145,7 @@ fn support_of_map(source: &Level, target: &Level, map: &Affine, spacing: f64) ->
 #[cfg(test)]
 mod tests {
     use srrf_cloud::PointCloud;
-    use srrf_cloud::shapes::ProceduralShapes;
+    use srrf_corrupt::shapes::ProceduralShapes;
     use srrf_corrupt::{
         CorruptionKind, Pair, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream,
     };

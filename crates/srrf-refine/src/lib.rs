@@ -6,7 +6,8 @@
 //! [`srrf_cloud::Register`]. A [`RefineTarget`] is prepared once and serves many sources.
 //!
 //! ```
-//! use srrf_cloud::{EulerXyz, Rigid, shapes::ProceduralShapes, source::ShapeSource};
+//! use srrf_cloud::{EulerXyz, Rigid};
+//! use srrf_corrupt::{shapes::ProceduralShapes, datasets::ShapeSource};
 //! use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream};
 //! use srrf_refine::{RefineConfig, refine};
 //!

@@ -49,6 +49,8 @@ impl<R: Register> Refined<R> {
             branches,
             skeletons: found.skeletons,
             matches: found.matches,
+            lambda: found.lambda,
+            certainty: None,
         })
     }
 }

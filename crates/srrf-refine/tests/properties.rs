@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use nalgebra::{Matrix6, Vector3};
-use srrf_cloud::shapes::ProceduralShapes;
 use srrf_cloud::{CloudError, EulerXyz, PointCloud, Register, RegisterError, Registration, Rigid};
 use srrf_corrupt::crop::visible;
+use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{CorruptionKind, Pair, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream};
 use srrf_refine::{Deformed, RefineConfig, RefineError, RefineTarget, Refined, Verdict, refine};
 

@@ -13,7 +13,7 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use divan::{Bencher, black_box};
 use srrf_cloud::PointCloud;
-use srrf_cloud::shapes::ProceduralShapes;
+use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{CorruptionKind, Pair, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream};
 use srrf_model::geometry::{even_subsample, farthest_points, k_nearest, nearest, share_within};
 use srrf_model::{

@@ -7,10 +7,10 @@ use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
-use srrf_cloud::shapes::ProceduralShapes;
-use srrf_cloud::source::{ACCEPTED_LAYOUTS, ShapeSource, SourceError, Split, held_out, open};
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::crop::{crop, random_direction};
+use srrf_corrupt::datasets::{ACCEPTED_LAYOUTS, ShapeSource, SourceError, Split, held_out, open};
+use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{
     CorruptionKind, Pair, PairConfig, PairError, PairSynthesizer, PoseDraw, Sampling, Severity,
     Stream as PairStream,

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use burn::module::Module;
 use burn::tensor::Device;
 use srrf_cloud::profile;
-use srrf_cloud::source::ShapeSource;
+use srrf_corrupt::datasets::ShapeSource;
 use srrf_corrupt::{Pair, Severity};
 use srrf_model::weights::{to_safetensors, write_atomically};
 use srrf_model::{init, is_accelerator};

@@ -18,7 +18,7 @@ use std::path::Path;
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::{DType, Device, Tensor};
-use srrf_cloud::shapes::ProceduralShapes;
+use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_model::weights::parameters;
 use srrf_model::{MatchingConfig, Srrf, correspondence_loss, init, registration_loss, skeleton_loss};
 use srrf_train::config::{Reduce, SemTraining, TrainConfig};

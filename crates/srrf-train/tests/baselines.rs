@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use burn::tensor::Device;
 use srrf_baselines::{DcpConfig, EquiGsprConfig, LearnedConfig, PanetConfig, PointNetLkConfig, RgmConfig};
-use srrf_cloud::shapes::ProceduralShapes;
+use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_model::weights::{parameters, read};
 use srrf_model::{NetworkConfig, SrrfConfig};
 use srrf_train::baseline::Baseline;

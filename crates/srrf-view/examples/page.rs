@@ -11,9 +11,9 @@ use std::path::PathBuf;
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
-use srrf_cloud::shapes::ProceduralShapes;
-use srrf_cloud::source::ShapeSource;
 use srrf_cloud::{EulerXyz, KnnIndex, PointCloud, Rigid, Skeleton, SoftMatch, farthest_point_sampling};
+use srrf_corrupt::datasets::ShapeSource;
+use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_view::{Number, Page, Pair, Pose};
 
 const USAGE: &str = "usage: page OUT.html [--points N] [--pairs N] [--offset X,Y,Z]";
@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let truth = rigid([20.0, -35.0, 50.0], (Vector3::new(0.5, -0.2, 0.3) + offset).into());
     let families = ["airplane", "chair", "quadruped", "bicycle"];
-    let known = srrf_cloud::shapes::FAMILIES.iter().map(|family| family.name);
+    let known = srrf_corrupt::shapes::FAMILIES.iter().map(|family| family.name);
     let families: Vec<&str> = known.filter(|name| families.contains(name)).collect();
     let families = (!families.is_empty()).then_some(families.as_slice());
     let shapes = ProceduralShapes::new(4, count.max(1), families)?;

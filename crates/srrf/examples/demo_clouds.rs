@@ -10,10 +10,10 @@ use nalgebra::{Rotation3, Unit, Vector3};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use srrf_cloud::io::write_cloud;
-use srrf_cloud::shapes::ProceduralShapes;
-use srrf_cloud::source::ShapeSource;
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::crop::crop;
+use srrf_corrupt::datasets::ShapeSource;
+use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{CorruptionKind, Severity, Variants, corruption};
 
 /// Metres of the shape's radius.

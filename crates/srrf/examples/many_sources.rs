@@ -5,7 +5,8 @@ use std::error::Error;
 
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use srrf::{Options, Outcome, Registrar, RotationRange};
-use srrf_cloud::{EulerXyz, PointCloud, Rigid, shapes::ProceduralShapes, source::ShapeSource};
+use srrf_cloud::{EulerXyz, PointCloud, Rigid};
+use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let (map, scans) = map_and_scans(5)?;

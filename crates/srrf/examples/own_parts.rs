@@ -6,11 +6,9 @@ use std::error::Error;
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-use srrf_cloud::{
-    EulerXyz, KnnIndex, PointCloud, Register, RegisterError, Registration, Rigid, shapes::ProceduralShapes,
-    source::ShapeSource,
-};
+use srrf_cloud::{EulerXyz, KnnIndex, PointCloud, Register, RegisterError, Registration, Rigid};
 use srrf_corrupt::{CorruptError, Corrupted, Corruption, Severity};
+use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
 use srrf_refine::{RefineConfig, Refined};
 
 /// Rain: drops in front of the sensor, a share of the points on the way to the origin of the scan.

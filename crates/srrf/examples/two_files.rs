@@ -9,7 +9,8 @@ use std::path::Path;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use srrf::Outcome;
 use srrf_cloud::io::{read_cloud, write_cloud};
-use srrf_cloud::{EulerXyz, Rigid, shapes::ProceduralShapes, source::ShapeSource};
+use srrf_cloud::{EulerXyz, Rigid};
+use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let files: Vec<String> = std::env::args().skip(1).collect();

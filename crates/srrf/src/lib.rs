@@ -1,7 +1,8 @@
 //! Registers two point clouds of any size, unit and place, and says whether it worked.
 //!
 //! ```
-//! use srrf_cloud::{EulerXyz, PointCloud, Rigid, shapes::ProceduralShapes, source::ShapeSource};
+//! use srrf_cloud::{EulerXyz, PointCloud, Rigid};
+//! use srrf_corrupt::{shapes::ProceduralShapes, datasets::ShapeSource};
 //! use rand::{SeedableRng, rngs::ChaCha8Rng};
 //!
 //! let shapes = ProceduralShapes::new(7, 3, None)?;

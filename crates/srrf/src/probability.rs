@@ -89,7 +89,7 @@ impl Features {
 
 /// Logistic regression on the features and their products of pairs.
 ///
-/// Fitted by `cargo run --release -p srrf --example calibrate` on pairs made from training shapes and
+/// Fitted by `cargo run --release -p srrf-lab --bin calibrate` on pairs made from training shapes and
 /// built-in shapes, none of which any test uses; the file holds what it was fitted on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

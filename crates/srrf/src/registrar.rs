@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use nalgebra::Matrix3;
 use rayon::prelude::*;
-use srrf_baselines::{FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
+use srrf_classical::{FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, Skeletons};
 use srrf_refine::{Ranking, RefineError, RefineTarget};
 

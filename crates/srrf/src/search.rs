@@ -81,7 +81,7 @@ impl<'a> Search<'a> {
 #[cfg(test)]
 mod tests {
     use srrf_cloud::EulerXyz;
-    use srrf_cloud::shapes::ProceduralShapes;
+    use srrf_corrupt::shapes::ProceduralShapes;
     use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream};
 
     use super::*;

@@ -72,7 +72,8 @@ fn subsample(cloud: &PointCloud) -> Result<PointCloud, CloudError> {
 mod tests {
     use nalgebra::Vector3;
     use rand::{SeedableRng, rngs::ChaCha8Rng};
-    use srrf_cloud::{Rigid, shapes::ProceduralShapes, source::ShapeSource};
+    use srrf_cloud::Rigid;
+    use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
 
     use super::*;
 

@@ -3,8 +3,8 @@
 use burn::tensor::{Tensor, TensorData};
 use srrf_model::geometry::{HostClouds, nearest, rows};
 
-use crate::correspond::nearest_descriptors;
-use crate::fpfh::{self, Descriptor, fpfh};
+use srrf_classical::fpfh::{self, Descriptor, fpfh};
+use srrf_classical::nearest_descriptors;
 
 /// Putative matches of a batch.
 #[derive(Debug, Clone)]

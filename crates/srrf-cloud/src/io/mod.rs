@@ -26,7 +26,7 @@ mod las;
 mod npy;
 mod npz;
 mod obj;
-pub(crate) mod off;
+pub mod off;
 mod pcd;
 mod ply;
 mod scalar;
@@ -38,7 +38,7 @@ mod text;
 pub use atomic::write_atomically;
 pub use error::{FormatError, IoError};
 pub use file::{CloudFile, Kept, format_names};
-pub(crate) use text::parse_point;
+pub use text::parse_point;
 
 /// A file format for clouds.
 pub trait CloudFormat: Sync {

@@ -9,8 +9,10 @@ use crate::Rigid;
 
 /// A mesh: vertices `[n, 3]`, and triangles as indices of vertices.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Mesh {
+pub struct Mesh {
+    /// Shape `[n, 3]`.
     pub vertices: Vec<[f64; 3]>,
+    /// Three numbers of vertices each.
     pub triangles: Vec<[usize; 3]>,
 }
 
@@ -127,7 +129,7 @@ fn triple(line: &Line, skip: usize) -> Result<([Range<usize>; 3], [f64; 3]), For
 }
 
 /// Reads a text OFF file. Polygons become fans of triangles; colours and normals are passed over.
-pub(crate) fn parse_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
+pub fn parse_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
     let mut lines = significant(bytes);
     let Header { vertices, faces, .. } = Header::parse(&mut lines)?;
     // The counts are not trusted with memory: a line takes 6 bytes or more.

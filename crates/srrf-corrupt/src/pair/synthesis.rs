@@ -1,8 +1,8 @@
 //! [`PairSynthesizer`]: corrupt, normalise, resample, pose, shuffle.
 
+use crate::datasets::{ShapeSource, SourceError};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, seq::SliceRandom};
-use srrf_cloud::source::{ShapeSource, SourceError};
 use srrf_cloud::{CloudError, PointCloud, Rigid};
 
 use super::pose::draw;

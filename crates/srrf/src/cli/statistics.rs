@@ -199,8 +199,8 @@ fn off_plane<'a>(points: impl ExactSizeIterator<Item = &'a [f64; 3]> + Clone) ->
 #[cfg(test)]
 mod tests {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
-    use srrf_cloud::{shapes::ProceduralShapes, source::ShapeSource};
     use srrf_corrupt::{CorruptionKind, Severity, Variants, corruption};
+    use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
 
     use super::*;
 

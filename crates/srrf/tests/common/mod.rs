@@ -9,7 +9,8 @@ use nalgebra::Vector3;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
 use srrf_cloud::io::write_cloud;
-use srrf_cloud::{EulerXyz, PointCloud, Rigid, shapes::ProceduralShapes, source::ShapeSource};
+use srrf_cloud::{EulerXyz, PointCloud, Rigid};
+use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
 
 /// A folder with a source, a target and the pose between them.
 pub struct Scene {

@@ -160,7 +160,7 @@ fn named_columns(title: &[u8], first: &[u8]) -> Option<[usize; 3]> {
 }
 
 /// The first three numbers of a line.
-pub(crate) fn parse_point(line: &str) -> Result<[f64; 3], String> {
+pub fn parse_point(line: &str) -> Result<[f64; 3], String> {
     Row::parse(line.as_bytes(), [0, 1, 2]).map(|row| row.point)
 }
 

@@ -1,0 +1,86 @@
+//! Matches between two clouds by their descriptors.
+
+use rayon::prelude::*;
+use srrf_cloud::{CloudError, PointCloud, RegisterError, point_spacing, voxel_downsample};
+
+use crate::fpfh::{Descriptor, fpfh};
+
+/// Two thinned clouds and the matches between them.
+pub(crate) struct Correspondences {
+    /// Thinned source, shape `[n, 3]`.
+    pub source: Vec<[f64; 3]>,
+    /// Thinned target, shape `[m, 3]`.
+    pub target: Vec<[f64; 3]>,
+    /// Side of a voxel, unit of the clouds: the yardstick of all thresholds.
+    pub voxel: f64,
+    /// Pairs of indices `(source, target)`.
+    pub pairs: Vec<(u32, u32)>,
+}
+
+/// Thins both clouds alike to at most `most_points`, describes and matches them.
+///
+/// The voxel is the point spacing of the sparser cloud (1.0 of it), or larger if that leaves more than
+/// `most_points`; the radius of the features is `feature_voxels` of it. A pair of points is a match if each is the other's nearest
+/// descriptor; where fewer than `least` are, every source point keeps its nearest.
+pub(crate) fn correspond(
+    source: &PointCloud,
+    target: &PointCloud,
+    most_points: usize,
+    feature_voxels: f64,
+    least: usize,
+) -> Result<Correspondences, RegisterError> {
+    source.check_rotation_observable().map_err(RegisterError::Source)?;
+    target.check_rotation_observable().map_err(RegisterError::Target)?;
+    let spacing = |cloud: &PointCloud| point_spacing(cloud.points());
+    let mut voxel =
+        spacing(source).map_err(RegisterError::Source)?.max(spacing(target).map_err(RegisterError::Target)?);
+    let thin = |cloud: &PointCloud, voxel: f64| {
+        voxel_downsample(cloud, voxel)
+            .map(PointCloud::into_points)
+            .map_err(|e| RegisterError::NoPose(e.to_string()))
+    };
+    let (source, target) = loop {
+        let both = (thin(source, voxel)?, thin(target, voxel)?);
+        if both.0.len().max(both.1.len()) <= most_points.max(16) {
+            break both;
+        }
+        voxel *= 1.15;
+    };
+    let describe = |points: &[[f64; 3]], wrap: fn(CloudError) -> RegisterError| {
+        fpfh(points, feature_voxels * voxel).map_err(wrap)
+    };
+    let (a, b) = (describe(&source, RegisterError::Source)?, describe(&target, RegisterError::Target)?);
+    let forth = nearest_descriptors(&a, &b);
+    let back = nearest_descriptors(&b, &a);
+    let all = || forth.iter().enumerate().map(|(i, &j)| (i as u32, j));
+    let mut pairs: Vec<(u32, u32)> = all().filter(|&(i, j)| back[j as usize] == i).collect();
+    if pairs.len() < least {
+        pairs = all().collect();
+    }
+    Ok(Correspondences { source, target, voxel, pairs })
+}
+
+/// For each of `a` the nearest of `b`, the lowest index of equals. By looking at all: in 33 dimensions
+/// trees hardly prune, and a plain loop fills the vector units.
+pub fn nearest_descriptors(a: &[Descriptor], b: &[Descriptor]) -> Vec<u32> {
+    a.par_iter()
+        .with_min_len(64)
+        .map(|x| {
+            let mut best = (f32::INFINITY, 0);
+            for (j, y) in b.iter().enumerate() {
+                let mut lanes = [0.0f32; 12];
+                for block in 0..3 {
+                    for (lane, sum) in lanes.iter_mut().enumerate() {
+                        let d = x[block * 12 + lane] - y[block * 12 + lane];
+                        *sum += d * d;
+                    }
+                }
+                let distance: f32 = lanes.iter().sum();
+                if distance < best.0 {
+                    best = (distance, j as u32);
+                }
+            }
+            best.1
+        })
+        .collect()
+}
