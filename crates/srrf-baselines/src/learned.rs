@@ -13,21 +13,6 @@ use srrf_model::{NetworkConfig, PairBatch, subsample};
 /// Largest number of points that a network sees of a cloud: what it was trained with.
 const MAX_POINTS: usize = 1024;
 
-/// Trained weights in the program, by the name of the method; their cards lie beside them in `weights/`. To add
-/// some: put `srrf-train`'s `best.safetensors` there as `<method>.safetensors`, and a line here.
-const EMBEDDED: &[(&str, &[u8])] = &[
-    ("dcp", include_bytes!("../weights/dcp.safetensors")),
-    ("equi-gspr", include_bytes!("../weights/equi-gspr.safetensors")),
-    ("panet", include_bytes!("../weights/panet.safetensors")),
-    ("pointnetlk", include_bytes!("../weights/pointnetlk.safetensors")),
-    ("rgm", include_bytes!("../weights/rgm.safetensors")),
-];
-
-/// The embedded weights of a method, if there are any.
-pub fn embedded(name: &str) -> Option<&'static [u8]> {
-    EMBEDDED.iter().find(|(known, _)| *known == name).map(|(_, bytes)| *bytes)
-}
-
 /// Pairs to learn from, in network units (see [`PairBatch`]).
 #[derive(Debug, Clone)]
 pub struct Lesson {

@@ -12,19 +12,22 @@
 //! take their shared parts from `srrf-model`: neighbours, attention, soft matching, the SVD head. What
 //! they have in common beyond that is in `dgcnn` and `pre_norm`.
 
-mod dcp;
+#[macro_use]
+mod list;
 mod dgcnn;
-mod equi_gspr;
 mod learned;
-mod panet;
-mod pointnetlk;
 mod pre_norm;
-mod rgm;
 mod se3;
 
-pub use dcp::{Dcp, DcpConfig, DcpLosses, DcpVersion};
-pub use equi_gspr::{EquiGspr, EquiGsprConfig, EquiGsprLosses, PutativeMatches};
-pub use learned::{LearnedConfig, LearnedRegister, Lesson, Pose, embedded};
-pub use panet::{Panet, PanetConfig, PanetLosses};
-pub use pointnetlk::{LkJacobian, PointNetLk, PointNetLkConfig, PointNetLkLosses};
-pub use rgm::{Rgm, RgmConfig, RgmLosses};
+// A new baseline is a file beside this one, and a line here; in the order of the tables. Its trained weights and their
+// card, where there are some, are `weights/NAME.safetensors` and `weights/NAME.md`.
+learned_baselines! {
+    pointnetlk::PointNetLkConfig, weights "pointnetlk";
+    dcp::DcpConfig, weights "dcp";
+    rgm::RgmConfig, weights "rgm";
+    panet::PanetConfig, weights "panet";
+    equi_gspr::EquiGsprConfig, weights "equi-gspr";
+}
+
+pub use learned::{LearnedConfig, LearnedRegister, Lesson, Pose};
+pub use list::{BaselineEntry, BaselineVisitor, TrainedWeights, embedded};

@@ -3,10 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use burn::tensor::Device;
-use srrf_baselines::{
-    DcpConfig, EquiGsprConfig, LearnedConfig, LearnedRegister, PanetConfig, PointNetLkConfig, RgmConfig,
-    embedded,
-};
+use srrf_baselines::{BASELINES, BaselineVisitor, LearnedConfig, LearnedRegister, embedded, visit};
 use srrf_cloud::Register;
 use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{Pair, PairConfig, PairSynthesizer, PoseDraw, Stream};
@@ -43,15 +40,29 @@ fn middle_share<C: LearnedConfig>() -> f64 {
     shares[shares.len() / 2]
 }
 
+struct MiddleShare;
+
+impl BaselineVisitor for MiddleShare {
+    type Output = f64;
+
+    fn visit<C: LearnedConfig + 'static>(self) -> f64 {
+        middle_share::<C>()
+    }
+}
+
 #[test]
 fn every_embedded_baseline_loads_and_helps() {
-    let shares = [
-        (DcpConfig::NAME, middle_share::<DcpConfig>()),
-        (EquiGsprConfig::NAME, middle_share::<EquiGsprConfig>()),
-        (PanetConfig::NAME, middle_share::<PanetConfig>()),
-        (PointNetLkConfig::NAME, middle_share::<PointNetLkConfig>()),
-        (RgmConfig::NAME, middle_share::<RgmConfig>()),
-    ];
-    assert!(shares.iter().all(|(_, share)| *share < 0.8), "{shares:?}");
-    assert!(embedded("icp").is_none());
+    for entry in BASELINES {
+        let weights = entry.weights.unwrap();
+        assert!(weights.card.contains(entry.name), "the card of {}", entry.name);
+        let share = visit(entry.name, MiddleShare).unwrap();
+        assert!(share < 0.8, "{}: {share}", entry.name);
+    }
+    assert!(embedded("icp").is_none() && visit("icp", MiddleShare).is_none());
+}
+
+#[test]
+fn names_differ() {
+    let names: std::collections::BTreeSet<&str> = BASELINES.iter().map(|entry| entry.name).collect();
+    assert_eq!(names.len(), BASELINES.len());
 }
