@@ -7,7 +7,7 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
-use srrf_model::geometry::even_tokens;
+use srrf_model::ops::even_tokens;
 use srrf_model::{NetworkConfig, WrongSize, procrustes, registration_loss, soft_matches};
 
 use crate::dgcnn::{Dgcnn, halves};

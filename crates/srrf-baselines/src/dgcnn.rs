@@ -6,7 +6,7 @@ use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
 use srrf_model::GroupNorm;
 use srrf_model::fast::{Activation, gather_max, linear};
-use srrf_model::geometry::{HostClouds, flat_indices, k_nearest, rows};
+use srrf_model::ops::{HostClouds, flat_indices, k_nearest, rows};
 
 /// Groups of each norm, as in RPMNet.
 pub(crate) const GROUPS: usize = 8;

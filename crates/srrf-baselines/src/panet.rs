@@ -13,7 +13,7 @@ use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
-use srrf_model::geometry::{HostClouds, even_tokens, flat_indices, k_nearest, rows};
+use srrf_model::ops::{HostClouds, even_tokens, flat_indices, k_nearest, rows};
 use srrf_model::{NetworkConfig, WrongSize, transform};
 
 use crate::dgcnn::{Block, max_over};

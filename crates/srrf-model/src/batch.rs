@@ -4,7 +4,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use nalgebra::{Matrix3, Vector3};
 use srrf_cloud::{PointCloud, Rigid};
 
-use crate::geometry::HostClouds;
+use crate::ops::HostClouds;
 
 /// Root mean square radius that clouds have inside the network. Clouds of ModelNet40 in the unit
 /// sphere have about this one, so thresholds in network units read as shares of the radius.

@@ -6,15 +6,14 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::confidence::Confidence;
-use crate::geometry::{HostClouds, rows_at};
 use crate::inference::Matches;
 use crate::integration::BranchPose;
-use crate::layout::BranchLayout;
 use crate::matching::{MatchingConfig, SoftMatching};
+use crate::ops::{HostClouds, RowNumbers, rows_at, token_rows};
 use crate::pfi::{Pfi, PfiConfig};
 use crate::prior::PositionPrior;
 use crate::procrustes::{procrustes, weighted_procrustes};
-use crate::sfe::{Sfe, SfeConfig};
+use crate::sfe::{Neighbourhood, Sfe, SfeConfig};
 use crate::timing::timed;
 
 /// Sizes of one branch.
@@ -47,6 +46,11 @@ impl BranchConfig {
             tokens: self.tokens,
         }
     }
+
+    /// The layout of `clouds`, sources and then targets.
+    pub fn layout(&self, clouds: &HostClouds, phase: f32) -> BranchLayout {
+        BranchLayout::new(clouds, self.tokens, self.sfe.neighbours, phase)
+    }
 }
 
 /// SFE -> PFI -> soft matching -> SVD. Weights are shared between source and target.
@@ -57,6 +61,39 @@ pub struct Branch {
     matching: SoftMatching,
     confidence: Option<Confidence>,
     tokens: usize,
+}
+
+/// The layout of a branch.
+#[derive(Debug, Clone)]
+pub struct BranchLayout {
+    /// Rows of the points that carry tokens; none where every point does.
+    tokens: Option<RowNumbers>,
+    /// Tokens a cloud.
+    per_cloud: usize,
+    /// Neighbours of the tokens.
+    neighbours: Neighbourhood,
+}
+
+impl BranchLayout {
+    /// `tokens` of each cloud (0 for all) along a space-filling curve, from `phase` in [0, 1), and their
+    /// `neighbours`.
+    pub fn new(clouds: &HostClouds, tokens: usize, neighbours: usize, phase: f32) -> Self {
+        let chosen = token_rows(clouds, tokens, phase);
+        let per_cloud = if chosen.is_some() { tokens } else { clouds.per_cloud() };
+        let neighbours = match &chosen {
+            Some(chosen) => Neighbourhood::new(&clouds.select(chosen, per_cloud), clouds, neighbours),
+            None => Neighbourhood::within(clouds, neighbours),
+        };
+        Self { tokens: chosen.map(RowNumbers::new), per_cloud, neighbours }
+    }
+
+    /// Sends the row numbers to the device that will run the branch, ahead of it; see [`RowNumbers::send`].
+    pub fn send(&mut self, device: &Device) {
+        if let Some(tokens) = &mut self.tokens {
+            tokens.send(device);
+        }
+        self.neighbours.send(device);
+    }
 }
 
 /// What a branch found.

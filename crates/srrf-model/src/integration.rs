@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::defaults;
-use crate::geometry::{HostClouds, share_within};
+use crate::ops::{HostClouds, share_within};
 use crate::procrustes::{nearest_rotation, transform};
 
 /// Which points the inlier test of a branch looks at.

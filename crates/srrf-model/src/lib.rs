@@ -15,21 +15,19 @@ pub mod defaults;
 mod device;
 pub mod embedded;
 pub mod fast;
-pub mod geometry;
 mod inference;
 pub mod init;
 mod integration;
-mod layout;
-mod loss;
+pub mod losses;
 mod matching;
 mod memory;
 mod norm;
+pub mod ops;
 mod pfi;
 mod prior;
 mod procrustes;
 mod register;
 mod sem;
-mod sem_loss;
 mod sfe;
 mod sizes;
 mod srrf;
@@ -37,24 +35,26 @@ mod timing;
 pub mod weights;
 
 pub use batch::{HostPairs, PairBatch, PairFrame};
-pub use branch::{Branch, BranchConfig, BranchOutput};
+pub use branch::{Branch, BranchConfig, BranchLayout, BranchOutput};
 pub use device::{
     DeviceError, NAMES as DEVICE_NAMES, built_in as built_in_devices, device, devices, is_accelerator,
     kind as device_kind,
 };
 pub use inference::{InferenceConfig, Matches};
 pub use integration::{BranchPose, Fusion, InlierTest, IntegrationConfig};
-pub use layout::{BranchLayout, Neighbourhood, SemLayout, SrrfLayout};
-pub use loss::{correspondence_loss, matching_loss, registration_loss};
+pub use losses::{
+    SkeletonLoss, SkeletonLossConfig, chamfer, correspondence_loss, matching_loss, registration_loss,
+    skeleton_loss, spread,
+};
 pub use matching::{MatchingConfig, Scaled, SoftMatches, SoftMatching, sinkhorn, soft_matches, standardised};
 pub use memory::keep_freed_memory;
 pub use norm::GroupNorm;
+pub use ops::nearest_distance;
 pub use pfi::{Pfi, PfiConfig};
 pub use prior::PositionPrior;
 pub use procrustes::{nearest_rotation, procrustes, transform, weighted_procrustes};
 pub use register::{SrrfRegister, subsample};
-pub use sem::{LevelConfig, Sem, SemConfig, Skeleton, nearest_distance};
-pub use sem_loss::{SkeletonLoss, SkeletonLossConfig, chamfer, skeleton_loss, spread};
-pub use sfe::{Sfe, SfeConfig};
+pub use sem::{LevelConfig, Sem, SemConfig, SemLayout, Skeleton};
+pub use sfe::{Neighbourhood, Sfe, SfeConfig};
 pub use sizes::{NetworkConfig, WrongSize};
-pub use srrf::{BranchKind, Srrf, SrrfConfig, SrrfOutput};
+pub use srrf::{BranchKind, Srrf, SrrfConfig, SrrfLayout, SrrfOutput};

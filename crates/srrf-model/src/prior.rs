@@ -3,7 +3,7 @@
 use burn::tensor::{Tensor, TensorData};
 
 use crate::batch::PairFrame;
-use crate::loss::squared_distances;
+use crate::ops::squared_distances;
 
 /// A Gaussian about each source point, as the pose of the pass before placed it, for where its match lies. Not in the
 /// paper, whose network is applied once and knows nothing of the pose. Without it matches are by features alone; the narrower

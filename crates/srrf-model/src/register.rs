@@ -8,9 +8,9 @@ use srrf_cloud::{
 
 use crate::batch::{PairBatch, PairFrame};
 use crate::branch::BranchOutput;
-use crate::geometry::even_subsample;
 use crate::inference::InferenceConfig;
 use crate::integration::IntegrationConfig;
+use crate::ops::even_subsample;
 use crate::prior::PositionPrior;
 use crate::sem;
 use crate::srrf::{BranchKind, Srrf};

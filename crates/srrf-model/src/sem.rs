@@ -8,8 +8,7 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::fast::{Activation, gather_max, gather_relu, linear};
-use crate::geometry::{HostClouds, flat_indices, nearest, rows};
-use crate::layout::SemLayout;
+use crate::ops::{HostClouds, farthest_points, flat_indices, k_nearest, nearest_distance, rows};
 
 /// Sizes of one set-abstraction level.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -70,6 +69,14 @@ impl SemConfig {
             logit_scale: self.logit_scale,
         }
     }
+
+    /// The layout of `clouds`.
+    pub fn layout(&self, clouds: &HostClouds) -> SemLayout {
+        SemLayout::new(
+            clouds,
+            self.levels.iter().map(|LevelConfig { points, neighbours, .. }| (*points, *neighbours)),
+        )
+    }
 }
 
 /// A stack of linear layers `channels -> widths[0] -> ..`.
@@ -101,6 +108,41 @@ pub struct Sem {
     head: Vec<HeadLayer>,
     weights: Linear,
     logit_scale: f64,
+}
+
+/// The layout of the skeleton extraction module, a level after the other.
+#[derive(Debug, Clone)]
+pub struct SemLayout(Vec<LevelLayout>);
+
+/// One set-abstraction level.
+#[derive(Debug, Clone)]
+struct LevelLayout {
+    /// Rows of the points kept by farthest point sampling; none where every point is.
+    chosen: Option<Vec<i64>>,
+    /// Points kept a cloud.
+    samples: usize,
+    /// Rows of the neighbours of each of them.
+    neighbours: Vec<i64>,
+}
+
+impl SemLayout {
+    /// Levels of so many points and neighbours each.
+    pub fn new(clouds: &HostClouds, levels: impl IntoIterator<Item = (usize, usize)>) -> Self {
+        let mut host = clouds.clone();
+        let level = |(points, k): (usize, usize)| {
+            let n = host.per_cloud();
+            // Farthest point sampling, unless every point is kept.
+            let samples = points.min(n);
+            let chosen =
+                (samples < n).then(|| flat_indices(&host, n, |_, cloud| farthest_points(cloud, samples)));
+            let centres = chosen.as_ref().map_or_else(|| host.clone(), |rows| host.select(rows, samples));
+            let supports: Vec<_> = host.iter().collect();
+            let neighbours = flat_indices(&centres, n, |i, centres| k_nearest(centres, supports[i], k));
+            host = centres;
+            LevelLayout { chosen, samples, neighbours }
+        };
+        Self(levels.into_iter().map(level).collect())
+    }
 }
 
 /// The skeleton of each cloud.
@@ -214,33 +256,6 @@ impl Level {
         let all: Vec<i64> = (0..(samples * self.neighbours) as i64).collect();
         gather_max(x, &all, self.neighbours)
     }
-}
-
-/// Distance from each of `points` to the nearest of `support`, differentiable in both. The nearest
-/// one is found on the host; the distance is floored at 1e-6, so that its gradient stays finite.
-///
-/// # Shapes
-/// - `points`: `[clouds, n, 3]`, `support`: `[clouds, m, 3]`
-/// - output: `[clouds, n]`
-pub fn nearest_distance(points: Tensor<3>, support: Tensor<3>) -> Tensor<2> {
-    let [clouds, n, _] = points.dims();
-    let nearest = nearest_rows(&points, &support);
-    let [_, m, _] = support.dims();
-    let matched = rows(support.reshape([clouds * m, 3]), &nearest);
-    distance(points.reshape([clouds * n, 3]) - matched).reshape([clouds, n])
-}
-
-/// Row numbers, in the flattened support, of the nearest support point of each point.
-pub(crate) fn nearest_rows(points: &Tensor<3>, support: &Tensor<3>) -> Vec<i64> {
-    let [_, m, _] = support.dims();
-    let (points, support) = (HostClouds::read(points), HostClouds::read(support));
-    let supports: Vec<_> = support.iter().collect();
-    flat_indices(&points, m, |i, cloud| nearest(cloud, supports[i]))
-}
-
-/// Norm of each row, floored at 1e-6. Shape `[rows, 3]` to `[rows]`.
-pub(crate) fn distance(difference: Tensor<2>) -> Tensor<1> {
-    difference.square().sum_dim(1).squeeze_dim::<1>(1).clamp_min(1e-12).sqrt()
 }
 
 impl Skeleton {

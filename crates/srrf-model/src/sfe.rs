@@ -9,8 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::attention::EncoderLayer;
 use crate::fast::{Activation, linear};
-use crate::geometry::{HostClouds, rows_at};
-use crate::layout::Neighbourhood;
+use crate::ops::{HostClouds, RowNumbers, flat_indices, k_nearest, rows_at};
 
 /// Sizes of the structural feature extractor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -64,6 +63,41 @@ pub struct Sfe {
     layers: Vec<SfeLayer>,
     norm: LayerNorm,
     neighbours: usize,
+}
+
+/// Row numbers of the `k` nearest neighbours of each token, itself included.
+#[derive(Debug, Clone)]
+pub struct Neighbourhood {
+    /// In the whole cloud.
+    in_cloud: RowNumbers,
+    /// Among the tokens; none where every point is one, and these are those in the cloud.
+    in_tokens: Option<RowNumbers>,
+}
+
+impl Neighbourhood {
+    /// The `k` nearest neighbours of `tokens` in `cloud` and among themselves.
+    pub fn new(tokens: &HostClouds, cloud: &HostClouds, k: usize) -> Self {
+        Self { in_tokens: Some(nearest_rows(tokens, tokens, k)), in_cloud: nearest_rows(tokens, cloud, k) }
+    }
+
+    /// Where every point of `cloud` is a token.
+    pub fn within(cloud: &HostClouds, k: usize) -> Self {
+        Self { in_cloud: nearest_rows(cloud, cloud, k), in_tokens: None }
+    }
+
+    /// See [`RowNumbers::send`].
+    pub(crate) fn send(&mut self, device: &Device) {
+        self.in_cloud.send(device);
+        if let Some(rows) = &mut self.in_tokens {
+            rows.send(device);
+        }
+    }
+}
+
+/// Rows of the `k` points of each of `support` that are nearest to each of `clouds`.
+fn nearest_rows(clouds: &HostClouds, support: &HostClouds, k: usize) -> RowNumbers {
+    let supports: Vec<_> = support.iter().collect();
+    RowNumbers::new(flat_indices(clouds, support.per_cloud(), |i, cloud| k_nearest(cloud, supports[i], k)))
 }
 
 impl Sfe {

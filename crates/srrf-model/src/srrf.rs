@@ -5,13 +5,12 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 use srrf_cloud::profile::stage;
 
-use crate::branch::{Branch, BranchConfig, BranchOutput};
-use crate::geometry::HostClouds;
+use crate::branch::{Branch, BranchConfig, BranchLayout, BranchOutput};
 use crate::inference::InferenceConfig;
 use crate::integration::{Fusion, IntegrationConfig};
-use crate::layout::{BranchLayout, SrrfLayout};
+use crate::ops::HostClouds;
 use crate::prior::PositionPrior;
-use crate::sem::{Sem, SemConfig, Skeleton};
+use crate::sem::{Sem, SemConfig, SemLayout, Skeleton};
 use crate::timing::timed;
 
 /// Sizes of the whole network.
@@ -40,6 +39,12 @@ impl SrrfConfig {
             skeleton: self.skeleton.init(device),
         }
     }
+
+    /// The layout of `clouds`, sources and then targets.
+    pub fn layout(&self, clouds: &HostClouds, phase: f32) -> SrrfLayout {
+        let (sem, dense) = (self.sem.layout(clouds), self.dense.layout(clouds, phase));
+        SrrfLayout { sem, dense, phase, prior: None }
+    }
 }
 
 /// The network.
@@ -51,6 +56,20 @@ pub struct Srrf {
     pub dense: Branch,
     /// The branch on the skeletons.
     pub skeleton: Branch,
+}
+
+/// The layout of a batch for the whole network; the skeleton branch has its own, once there are
+/// skeletons.
+#[derive(Debug, Clone)]
+pub struct SrrfLayout {
+    /// Of the skeleton extraction module, on sources and then targets.
+    pub sem: SemLayout,
+    /// Of the dense branch, likewise.
+    pub dense: BranchLayout,
+    /// In [0, 1): where along the curve the tokens of the skeleton branch start, if not all are tokens.
+    pub phase: f32,
+    /// Where matches are to be expected, once a pass has found a pose; training and first passes have none.
+    pub prior: Option<PositionPrior>,
 }
 
 /// One of the two branches.

@@ -15,7 +15,7 @@ use divan::{Bencher, black_box};
 use srrf_cloud::PointCloud;
 use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{CorruptionKind, Pair, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream};
-use srrf_model::geometry::{even_subsample, farthest_points, k_nearest, nearest, share_within};
+use srrf_model::ops::{even_subsample, farthest_points, k_nearest, nearest, share_within};
 use srrf_model::{
     BranchConfig, PairBatch, SoftMatching, Srrf, SrrfConfig, SrrfOutput, init, keep_freed_memory, procrustes,
 };

@@ -7,7 +7,7 @@ use burn::optim::GradientsParams;
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 use srrf_baselines::{LearnedConfig, Lesson, embedded};
-use srrf_model::geometry::HostClouds;
+use srrf_model::ops::HostClouds;
 use srrf_model::weights::{WeightsError, parse, read};
 use srrf_model::{NetworkConfig, WrongSize};
 

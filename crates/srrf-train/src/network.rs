@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use srrf_cloud::Rigid;
 use srrf_cloud::profile::stage;
-use srrf_model::geometry::HostClouds;
+use srrf_model::ops::HostClouds;
 use srrf_model::weights::WeightsError;
 use srrf_model::{NetworkConfig, PairBatch};
 

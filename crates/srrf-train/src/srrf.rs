@@ -4,7 +4,7 @@ use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};
 use srrf_cloud::Rigid;
-use srrf_model::geometry::HostClouds;
+use srrf_model::ops::HostClouds;
 use srrf_model::weights::WeightsError;
 use srrf_model::{
     BranchLayout, BranchOutput, SemLayout, Skeleton, Srrf, SrrfConfig, SrrfLayout, chamfer,

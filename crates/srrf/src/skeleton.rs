@@ -2,7 +2,7 @@
 
 use srrf_cloud::{CloudError, PointCloud};
 use srrf_model::PairBatch;
-use srrf_model::geometry::even_subsample;
+use srrf_model::ops::even_subsample;
 
 use crate::frame::Centred;
 use crate::network::{open, thinned};

@@ -5,7 +5,7 @@ use burn::nn::{LayerNorm, LayerNormConfig, Linear, LinearConfig};
 use burn::tensor::Tensor;
 use burn::tensor::{Device, activation};
 use srrf_model::fast::{Activation, linear};
-use srrf_model::geometry::{HostClouds, flat_indices, k_nearest, rows};
+use srrf_model::ops::{HostClouds, flat_indices, k_nearest, rows};
 
 /// Invariants of an edge: squared distance, distance, dot product.
 const INVARIANTS: usize = 3;

@@ -1,7 +1,7 @@
 //! Putative matches by FPFH, and the choice among them.
 
 use burn::tensor::{Tensor, TensorData};
-use srrf_model::geometry::{HostClouds, nearest, rows};
+use srrf_model::ops::{HostClouds, nearest, rows};
 
 use srrf_classical::fpfh::{self, Descriptor, fpfh};
 use srrf_classical::nearest_descriptors;

@@ -24,7 +24,7 @@ use burn::tensor::activation::sigmoid;
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
-use srrf_model::geometry::{even_tokens, rows};
+use srrf_model::ops::{even_tokens, rows};
 use srrf_model::{NetworkConfig, WrongSize, transform, weighted_procrustes};
 
 use crate::learned::{LearnedConfig, Lesson, Pose};

@@ -3,7 +3,7 @@
 use burn::tensor::Tensor;
 use nalgebra::SMatrix;
 use srrf_model::fast::{Activation, linear};
-use srrf_model::geometry::rows;
+use srrf_model::ops::rows;
 use srrf_model::transform;
 
 use super::PointNetLk;

@@ -15,7 +15,7 @@ use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
-use srrf_model::geometry::even_tokens;
+use srrf_model::ops::even_tokens;
 use srrf_model::{NetworkConfig, WrongSize, transform};
 
 use crate::dgcnn::max_over;

@@ -1,7 +1,7 @@
 //! One-to-one matches of an assignment: the Hungarian method.
 
 use burn::tensor::{Tensor, TensorData};
-use srrf_model::geometry::rows;
+use srrf_model::ops::rows;
 
 /// A node whose row or column sums to less has no match.
 const LEAST_SUM: f64 = 0.5;

@@ -14,7 +14,7 @@ mod truth;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
-use srrf_model::geometry::even_tokens;
+use srrf_model::ops::even_tokens;
 use srrf_model::{NetworkConfig, WrongSize, sinkhorn, transform, weighted_procrustes};
 
 use crate::dgcnn::{Dgcnn, halves};

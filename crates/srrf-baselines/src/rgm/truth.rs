@@ -1,7 +1,7 @@
 //! The assignment that RGM learns.
 
 use burn::tensor::Tensor;
-use srrf_model::geometry::{HostClouds, nearest};
+use srrf_model::ops::{HostClouds, nearest};
 
 use crate::se3::constant;
 

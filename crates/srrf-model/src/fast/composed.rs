@@ -4,8 +4,8 @@ use burn::nn::{LayerNorm, Linear};
 use burn::tensor::Tensor;
 use burn::tensor::activation::{relu, sigmoid, softmax};
 
-use super::Activation;
-use crate::geometry::{on_cubecl, rows};
+use super::linear::Activation;
+use crate::ops::{on_cubecl, rows};
 
 /// `act(x W + b)`; shapes as in [`super::linear`].
 pub fn linear(layer: &Linear, x: Tensor<2>, activation: Activation) -> Tensor<2> {

@@ -3,7 +3,8 @@
 use burn::tensor::TensorData;
 use burn_flex::FlexTensor;
 use gemm::Parallelism;
-use pulp::Arch;
+
+pub use crate::ops::simd::vectorized;
 
 /// The values of a tensor in row-major order, and the tensor that holds them.
 pub fn contiguous(tensor: FlexTensor) -> FlexTensor {
@@ -93,11 +94,6 @@ pub fn matmul(
             Parallelism::None,
         );
     }
-}
-
-/// Runs a loop with the widest vectors of the processor.
-pub fn vectorized<T>(job: impl FnOnce() -> T) -> T {
-    Arch::new().dispatch(job)
 }
 
 /// `e^x` to 2 units in the last place, 0 below -87, without a call, so that loops of it vectorise.

@@ -25,7 +25,6 @@ use burn::nn::{LayerNorm, Linear};
 use burn::tensor::{DType, Device, Tensor};
 
 use backend::FastOps;
-pub(crate) use kernels::vectorized;
 pub use linear::Activation;
 
 /// Whether the custom operations serve `tensor`.

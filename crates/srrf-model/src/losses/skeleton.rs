@@ -5,9 +5,9 @@ use burn::tensor::{Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
 use crate::defaults;
-use crate::geometry::rows;
+use crate::ops::{distance, nearest_distance, nearest_rows, rows};
 use crate::procrustes::transform;
-use crate::sem::{Skeleton, distance, nearest_distance, nearest_rows};
+use crate::sem::Skeleton;
 
 /// Weights of the skeleton losses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 
 use burn::tensor::Device;
 use common::{Numbers, tensor, values};
-use srrf_model::geometry::{
+use srrf_model::ops::{
     HostClouds, even_subsample, farthest_points, flat_indices, k_nearest, nearest, rows, share_within,
 };
 
