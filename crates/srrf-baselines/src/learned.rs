@@ -6,7 +6,7 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use srrf_cloud::{PointCloud, Register, RegisterError, Registration};
+use srrf_cloud::{Register, RegisterError, Registration, Solid};
 use srrf_model::weights::LoadedModel;
 use srrf_model::{NetworkConfig, PairBatch, subsample};
 
@@ -86,11 +86,9 @@ impl<C: LearnedConfig> Register for LearnedRegister<C> {
         C::NAME
     }
 
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
-        source.check_rotation_observable().map_err(RegisterError::Source)?;
-        target.check_rotation_observable().map_err(RegisterError::Target)?;
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
         let points = source.len().min(target.len()).min(MAX_POINTS);
-        let (source, target) = (subsample(source, points)?, subsample(target, points)?);
+        let (source, target) = (subsample(&source, points)?, subsample(&target, points)?);
         let no_pose = |why: &str| RegisterError::NoPose(why.into());
         let batch = PairBatch::new(&[(&source, &target)], &self.device)
             .ok_or_else(|| no_pose("the clouds differ in their number of points"))?;

@@ -1,7 +1,7 @@
 //! Matches between two clouds by their descriptors.
 
 use rayon::prelude::*;
-use srrf_cloud::{CloudError, PointCloud, RegisterError, point_spacing, voxel_downsample};
+use srrf_cloud::{CloudError, PointCloud, RegisterError, Solid, point_spacing, voxel_downsample};
 
 use crate::fpfh::{Descriptor, fpfh};
 
@@ -23,19 +23,17 @@ pub(crate) struct Correspondences {
 /// `most_points`; the radius of the features is `feature_voxels` of it. A pair of points is a match if each is the other's nearest
 /// descriptor; where fewer than `least` are, every source point keeps its nearest.
 pub(crate) fn correspond(
-    source: &PointCloud,
-    target: &PointCloud,
+    source: Solid<'_>,
+    target: Solid<'_>,
     most_points: usize,
     feature_voxels: f64,
     least: usize,
 ) -> Result<Correspondences, RegisterError> {
-    source.check_rotation_observable().map_err(RegisterError::Source)?;
-    target.check_rotation_observable().map_err(RegisterError::Target)?;
-    let spacing = |cloud: &PointCloud| point_spacing(cloud.points());
+    let spacing = |cloud: Solid<'_>| point_spacing(cloud.points());
     let mut voxel =
         spacing(source).map_err(RegisterError::Source)?.max(spacing(target).map_err(RegisterError::Target)?);
-    let thin = |cloud: &PointCloud, voxel: f64| {
-        voxel_downsample(cloud, voxel)
+    let thin = |cloud: Solid<'_>, voxel: f64| {
+        voxel_downsample(&cloud, voxel)
             .map(PointCloud::into_points)
             .map_err(|e| RegisterError::NoPose(e.to_string()))
     };

@@ -3,7 +3,7 @@
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
-use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid};
+use srrf_cloud::{Register, RegisterError, Registration, Rigid, Solid};
 use srrf_refine::{Deformed, Match, NormalEquations, RefineConfig, RefineTarget};
 
 use crate::correspond::{Correspondences, correspond};
@@ -69,7 +69,7 @@ impl Register for Fgr {
         "fgr"
     }
 
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
         let config = &self.config;
         let matches = correspond(source, target, config.points, config.feature_voxels, 30)?;
         let pairs = tuple_test(&matches, config);

@@ -1,7 +1,7 @@
 //! Global registration: FPFH, RANSAC, refinement.
 
 use serde::{Deserialize, Serialize};
-use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid};
+use srrf_cloud::{Register, RegisterError, Registration, Rigid, Solid};
 use srrf_refine::{Deformed, RefineConfig, RefineTarget};
 
 use crate::correspond::correspond;
@@ -68,7 +68,7 @@ impl FpfhRansac {
     ///
     /// # Errors
     /// [`RegisterError`] for clouds that cannot be used, and where no sample was consistent.
-    pub fn hypotheses(&self, source: &PointCloud, target: &PointCloud) -> Result<Hypotheses, RegisterError> {
+    pub fn hypotheses(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Hypotheses, RegisterError> {
         let config = &self.config;
         let matches = correspond(source, target, config.points, config.feature_voxels, 30)?;
         let search = Search {
@@ -105,7 +105,7 @@ impl Register for FpfhRansac {
         "fpfh-ransac"
     }
 
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
         let found = self.hypotheses(source, target)?;
         let Some(config) = &self.config.refine else {
             return Ok(Registration { iterations: found.drawn, ..Registration::from_pose(found.poses[0]) });

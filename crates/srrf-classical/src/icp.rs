@@ -1,7 +1,7 @@
 //! Iterative closest point (Besl and McKay 1992), point to point.
 
 use serde::{Deserialize, Serialize};
-use srrf_cloud::{KnnIndex, PointCloud, Register, RegisterError, Registration, Rigid};
+use srrf_cloud::{KnnIndex, PointCloud, Register, RegisterError, Registration, Rigid, Solid};
 
 /// Settings of [`Icp`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -50,9 +50,7 @@ impl Register for Icp {
         if self.config.centred { "icp-centred" } else { "icp" }
     }
 
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
-        source.check_rotation_observable().map_err(RegisterError::Source)?;
-        target.check_rotation_observable().map_err(RegisterError::Target)?;
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
         let neighbours = KnnIndex::new(target.points()).map_err(RegisterError::Target)?;
         let limit = self.config.max_distance.map_or(f64::INFINITY, |d| d * d);
         let step_limit = self.config.tolerance * rms_radius(target);

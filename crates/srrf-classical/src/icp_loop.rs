@@ -1,7 +1,7 @@
 //! The loop that the variants of ICP share: match, weigh, step.
 
 use nalgebra::Vector3;
-use srrf_cloud::{KnnIndex, PointCloud, RegisterError, Registration, Rigid, estimate_normals, spacing_of};
+use srrf_cloud::{KnnIndex, RegisterError, Registration, Rigid, Solid, estimate_normals, spacing_of};
 use srrf_refine::{Match, NormalEquations};
 
 /// A target made ready, and the source in the frame of its mean.
@@ -19,12 +19,10 @@ pub(crate) struct Scene {
 impl Scene {
     /// With normals from `neighbours` points each, if asked for.
     pub fn new(
-        source: &PointCloud,
-        target: &PointCloud,
+        source: Solid<'_>,
+        target: Solid<'_>,
         neighbours: Option<usize>,
     ) -> Result<Self, RegisterError> {
-        source.check_rotation_observable().map_err(RegisterError::Source)?;
-        target.check_rotation_observable().map_err(RegisterError::Target)?;
         let target_mean = target.centroid();
         let centred: Vec<[f64; 3]> =
             target.points().iter().map(|p| (Vector3::from(*p) - target_mean).into()).collect();

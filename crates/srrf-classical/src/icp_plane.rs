@@ -1,7 +1,7 @@
 //! Iterative closest point, point to plane.
 
 use serde::{Deserialize, Serialize};
-use srrf_cloud::{PointCloud, Register, RegisterError, Registration};
+use srrf_cloud::{Register, RegisterError, Registration, Solid};
 
 use crate::icp_loop::Scene;
 
@@ -45,7 +45,7 @@ impl Register for IcpPlane {
         "icp-plane"
     }
 
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
         let config = &self.config;
         let limit = config.max_distance.map_or(f64::INFINITY, |d| d * d);
         let scene = Scene::new(source, target, Some(config.normal_neighbours))?;

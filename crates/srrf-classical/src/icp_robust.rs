@@ -1,7 +1,7 @@
 //! Iterative closest point with a robust kernel.
 
 use serde::{Deserialize, Serialize};
-use srrf_cloud::{PointCloud, Register, RegisterError, Registration};
+use srrf_cloud::{Register, RegisterError, Registration, Solid};
 
 use crate::icp_loop::Scene;
 
@@ -54,7 +54,7 @@ impl Register for IcpRobust {
         "icp-robust"
     }
 
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
         let config = &self.config;
         let scene = Scene::new(source, target, config.normal_neighbours)?;
         let least = (config.least_spacings * scene.spacing).max(f64::MIN_POSITIVE);

@@ -1,7 +1,7 @@
 //! Trimmed iterative closest point.
 
 use serde::{Deserialize, Serialize};
-use srrf_cloud::{PointCloud, Register, RegisterError, Registration};
+use srrf_cloud::{Register, RegisterError, Registration, Solid};
 
 use crate::icp_loop::Scene;
 
@@ -47,7 +47,7 @@ impl Register for IcpTrimmed {
         "icp-trimmed"
     }
 
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
         let config = &self.config;
         let scene = Scene::new(source, target, None)?;
         scene.run(config.max_iterations, config.tolerance, |squared, iteration| {

@@ -14,6 +14,7 @@ mod normals;
 pub mod profile;
 mod register;
 mod rigid;
+mod solid;
 mod triangles;
 mod voxel;
 
@@ -26,5 +27,6 @@ pub use register::{
     Branch, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, SoftMatch,
 };
 pub use rigid::Rigid;
+pub use solid::Solid;
 pub use triangles::Triangles;
 pub use voxel::{VoxelError, point_spacing, spacing_of, voxel_downsample};

@@ -1,6 +1,6 @@
 //! The seam that every registration method implements.
 
-use crate::{CloudError, PointCloud, Rigid};
+use crate::{CloudError, PointCloud, Rigid, Solid};
 
 /// Why two clouds could not be registered.
 #[derive(Debug, thiserror::Error)]
@@ -122,18 +122,19 @@ pub trait Register: Send + Sync {
     /// The name in tables, in lower case, such as `icp`.
     fn name(&self) -> &str;
 
-    /// Finds the pose that maps `source` onto `target`.
+    /// Finds the pose that maps `source` onto `target`: checks both clouds, then [`Register::register_solid`].
     ///
     /// # Errors
     /// [`RegisterError`] when a cloud cannot be used or no pose is found.
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError>;
-
-    /// Registers many pairs. Answers come in the order of the pairs, and equal those of
-    /// [`Register::register`] one by one; methods that gain from batches override this.
-    fn register_batch(
-        &self,
-        pairs: &[(&PointCloud, &PointCloud)],
-    ) -> Vec<Result<Registration, RegisterError>> {
-        pairs.iter().map(|(source, target)| self.register(source, target)).collect()
+    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+        let source = Solid::new(source).map_err(RegisterError::Source)?;
+        let target = Solid::new(target).map_err(RegisterError::Target)?;
+        self.register_solid(source, target)
     }
+
+    /// As [`Register::register`], of clouds that determine a rotation. This is what a method writes.
+    ///
+    /// # Errors
+    /// [`RegisterError`] when no pose is found.
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError>;
 }

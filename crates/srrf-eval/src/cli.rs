@@ -75,10 +75,6 @@ pub struct Options {
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
 
-    /// Pairs in one call of a method
-    #[arg(long, value_name = "N", default_value_t = 16)]
-    pub batch: usize,
-
     /// Folder for the report
     #[arg(long, value_name = "DIR", default_value = "report")]
     pub out: PathBuf,

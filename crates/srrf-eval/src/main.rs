@@ -75,7 +75,6 @@ fn run(options: &Options) -> Result<(), EvalError> {
         methods: &methods,
         transforms,
         rows: selection.rows,
-        batch: options.batch.max(1),
         threads,
         cache: None,
     };
@@ -101,7 +100,6 @@ fn run(options: &Options) -> Result<(), EvalError> {
         weights,
         device: options.device.clone(),
         threads,
-        batch: run.batch,
         machine: report::machine(),
         seconds: start.elapsed().as_secs_f64(),
         started_unix: SystemTime::now()

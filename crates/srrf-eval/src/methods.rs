@@ -46,9 +46,6 @@ pub struct Method {
     /// Settings that are not the method's defaults, in words; empty for the defaults. With name and
     /// weights they name its answers in a [`Cache`](crate::Cache).
     pub settings: String,
-    /// Whether one call on a batch keeps all cores busy. Batches of other methods are run side by
-    /// side.
-    pub parallel_inside: bool,
     /// Rows of another method that this one answers on its way, each with the branch that holds it: where
     /// they are all that is wanted of the other, it need not run. As in its entry.
     pub holds: &'static [(&'static str, &'static str)],
@@ -128,13 +125,7 @@ const fn optional(
 
 /// A method that learns nothing, with its defaults.
 pub(crate) fn plain(register: impl Register + 'static) -> Method {
-    Method {
-        register: Box::new(register),
-        weights: None,
-        settings: String::new(),
-        parallel_inside: false,
-        holds: &[],
-    }
+    Method { register: Box::new(register), weights: None, settings: String::new(), holds: &[] }
 }
 
 /// A learned baseline, with the weights of `--weights NAME=PATH` or those in the program.

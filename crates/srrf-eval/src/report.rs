@@ -31,8 +31,6 @@ pub struct Meta {
     pub device: String,
     /// Worker threads.
     pub threads: usize,
-    /// Pairs in one call of a method.
-    pub batch: usize,
     /// Processor and number of cores.
     pub machine: String,
     /// Duration of the whole run, in seconds.
@@ -252,7 +250,6 @@ mod tests {
             weights: [("a".to_owned(), "built in".to_owned())].into(),
             device: "flex".into(),
             threads: 2,
-            batch: 16,
             machine: machine(),
             seconds: 1.5,
             started_unix: 0,

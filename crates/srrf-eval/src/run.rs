@@ -15,6 +15,9 @@ use crate::metrics::{PairError, is_finite};
 use crate::pairs::{EvalPair, Group, PairSource};
 use crate::transforms::Transforms;
 
+/// Pairs of each thread between two reports of progress.
+const CHUNK: usize = 8;
+
 /// What is run, and how.
 pub struct Run<'a> {
     /// The pairs.
@@ -26,8 +29,6 @@ pub struct Run<'a> {
     pub transforms: Vec<Transforms>,
     /// Names of the rows to keep, in the order of the tables.
     pub rows: Vec<String>,
-    /// Pairs in one call of a method.
-    pub batch: usize,
     /// Worker threads, at least 1.
     pub threads: usize,
     /// Answers that were computed before, and where new ones are kept.
@@ -47,7 +48,7 @@ pub struct Answer {
     pub iterations: Option<usize>,
     /// Whether the method's own stopping rule was met.
     pub converged: Option<bool>,
-    /// Time of the call, divided by the pairs in it; `None` for the oracle and transforms from a file.
+    /// Time of the call; `None` for the oracle and transforms from a file.
     pub seconds: Option<f64>,
     /// How well the skeletons agree under the true pose; only in the row of a method that makes
     /// skeletons, not in those of its branches.
@@ -107,7 +108,7 @@ impl Run<'_> {
             .flat_map(|(group, g)| (0..g.pairs).map(move |item| (group, item)))
             .collect();
         let mut records = Vec::with_capacity(work.len());
-        for chunk in work.chunks(self.batch.max(1) * self.threads.max(1)) {
+        for chunk in work.chunks(CHUNK * self.threads.max(1)) {
             let pairs: Vec<EvalPair> = chunk
                 .par_iter()
                 .map(|&(group, item)| self.pairs.pair(group, item))
@@ -165,26 +166,19 @@ impl Run<'_> {
         Ok((0..pairs.len()).filter_map(answer).collect())
     }
 
-    /// One method on pairs: batch after batch where the method spreads over the cores itself, side by
-    /// side where it does not.
+    /// One method on pairs, side by side.
     fn register(&self, method: &Method, pairs: &[&EvalPair]) -> Vec<Found> {
         let known = METHODS.iter().find(|entry| entry.name == method.register.name());
         let name = known.map_or("another method", |entry| entry.name);
-        let call = |batch: &[&EvalPair]| -> Vec<Found> {
-            let clouds: Vec<_> = batch.iter().map(|p| (&p.pair.source, &p.pair.target)).collect();
+        let call = |pair: &&EvalPair| {
+            let pair = &pair.pair;
             let start = Instant::now();
-            let answers = profile::stage(name, || method.register.register_batch(&clouds));
-            let seconds = start.elapsed().as_secs_f64() / batch.len() as f64;
-            let truths = batch.iter().map(|p| &p.pair.target_from_source);
-            answers.into_iter().zip(truths).map(|(a, truth)| Found::new(a, truth, seconds)).collect()
+            let answer = profile::stage(name, || method.register.register(&pair.source, &pair.target));
+            Found::new(answer, &pair.target_from_source, start.elapsed().as_secs_f64())
         };
-        if pairs.is_empty() {
-            Vec::new()
-        } else if method.parallel_inside {
-            pairs.chunks(self.batch.max(1)).flat_map(call).collect()
-        } else {
-            pairs.par_chunks(pairs.len().div_ceil(self.threads.max(1))).flat_map_iter(call).collect()
-        }
+        // One part for each thread, so that none takes up another pair while the first is being timed.
+        let part = pairs.len().div_ceil(self.threads.max(1)).max(1);
+        pairs.par_chunks(part).flat_map_iter(|part| part.iter().map(call)).collect()
     }
 
     /// Scores all rows on one pair.
@@ -272,7 +266,7 @@ impl Answer {
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::{Branch, PointCloud, Register, RegisterError, Registration, Skeleton, Skeletons};
+    use srrf_cloud::{Branch, Register, RegisterError, Registration, Skeleton, Skeletons, Solid};
     use srrf_corrupt::{CorruptionKind, PairConfig, Severity};
 
     use super::*;
@@ -288,7 +282,7 @@ mod tests {
             "moody"
         }
 
-        fn register(&self, source: &PointCloud, _: &PointCloud) -> Result<Registration, RegisterError> {
+        fn register_solid(&self, source: Solid<'_>, _: Solid<'_>) -> Result<Registration, RegisterError> {
             if source.points()[0][0] > 0.0 {
                 return Err(RegisterError::NoPose("not today".into()));
             }
@@ -320,22 +314,16 @@ mod tests {
         SynthesizedPairs::new(data::procedural(11).unwrap(), protocol).unwrap()
     }
 
-    fn run(pairs: &SynthesizedPairs, batch: usize, threads: usize, parallel_inside: bool) -> Outcome {
-        cached(pairs, batch, threads, parallel_inside, None)
+    fn run(pairs: &SynthesizedPairs, threads: usize) -> Outcome {
+        cached(pairs, threads, None)
     }
 
-    fn cached(
-        pairs: &SynthesizedPairs,
-        batch: usize,
-        threads: usize,
-        parallel_inside: bool,
-        cache: Option<&Cache>,
-    ) -> Outcome {
-        let moody = Method { parallel_inside, ..crate::methods::plain(Moody) };
+    fn cached(pairs: &SynthesizedPairs, threads: usize, cache: Option<&Cache>) -> Outcome {
+        let moody = crate::methods::plain(Moody);
         let icp = crate::methods::METHODS.iter().find(|m| m.name == "icp").unwrap();
         let methods = vec![(ROWS, moody), (icp.rows, (icp.build)(&Default::default()).unwrap())];
         let rows = ["icp", ORACLE, "moody-left", "moody-right", "moody"].map(str::to_owned).to_vec();
-        let run = Run { pairs, methods: &methods, transforms: vec![], rows, batch, threads, cache };
+        let run = Run { pairs, methods: &methods, transforms: vec![], rows, threads, cache };
         let mut done = 0;
         let outcome = run.execute(&mut |pairs, _| done += pairs).unwrap();
         assert_eq!(done, 22);
@@ -343,11 +331,11 @@ mod tests {
     }
 
     #[test]
-    fn threads_and_batches_change_nothing() {
+    fn threads_change_nothing() {
         let pairs = pairs();
-        let one = run(&pairs, 1, 1, false);
-        for (batch, threads, parallel_inside) in [(4, 2, false), (3, 2, true), (100, 3, false)] {
-            let other = run(&pairs, batch, threads, parallel_inside);
+        let one = run(&pairs, 1);
+        for threads in [2, 3, 30] {
+            let other = run(&pairs, threads);
             for (a, b) in one.records.iter().zip(&other.records) {
                 assert_eq!((a.group, a.item, &a.id), (b.group, b.item, &b.id));
                 for (a, b) in a.answers.iter().zip(&b.answers) {
@@ -360,9 +348,9 @@ mod tests {
     #[test]
     fn the_cache_gives_back_every_bit_of_the_answers() {
         let (pairs, folder) = (pairs(), tempfile::tempdir().unwrap());
-        let fresh = cached(&pairs, 4, 2, false, Some(&Cache::open(folder.path(), "flex").unwrap()));
+        let fresh = cached(&pairs, 2, Some(&Cache::open(folder.path(), "flex").unwrap()));
         let cache = Cache::open(folder.path(), "flex").unwrap();
-        let again = cached(&pairs, 3, 1, false, Some(&cache));
+        let again = cached(&pairs, 1, Some(&cache));
         assert_eq!(cache.reused(), 2 * 22, "both methods on every pair");
         // Answers hold NaN nowhere, so their text says all; times are those of the first run.
         assert_eq!(format!("{:?}", fresh.records), format!("{:?}", again.records));
@@ -370,7 +358,7 @@ mod tests {
 
     #[test]
     fn branches_failures_and_the_oracle_are_scored() {
-        let outcome = run(&pairs(), 5, 2, false);
+        let outcome = run(&pairs(), 2);
         let (mut failed, mut answered) = (0, 0);
         for record in &outcome.records {
             let [_, oracle, left, right, moody] = &record.answers[..] else { panic!() };

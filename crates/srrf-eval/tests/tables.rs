@@ -112,7 +112,7 @@ fn a_killed_run_goes_on_to_the_same_numbers() {
     let straight = run(folder.path(), &[&slow[..], &["--out", "straight"]].concat());
     assert!(straight.status.success());
 
-    let arguments = [&slow[..], &["--out", "killed", "--threads", "1", "--batch", "1"]].concat();
+    let arguments = [&slow[..], &["--out", "killed", "--threads", "1"]].concat();
     let mut child = command(folder.path(), &arguments).stdout(std::process::Stdio::null()).spawn().unwrap();
     let answers = folder.path().join("killed/cache/answers.jsonl");
     let start = Instant::now();

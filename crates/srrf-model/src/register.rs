@@ -3,7 +3,7 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use srrf_cloud::{
-    Branch, PointCloud, Register, RegisterError, Registration, Rigid, Skeleton, Skeletons, SoftMatch,
+    Branch, PointCloud, Register, RegisterError, Registration, Rigid, Skeleton, Skeletons, SoftMatch, Solid,
 };
 
 use crate::batch::{PairBatch, PairFrame};
@@ -125,25 +125,9 @@ impl Register for SrrfRegister {
         }
     }
 
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
-        let mut answers = self.register_batch(&[(source, target)]);
-        answers.pop().unwrap_or_else(|| Err(RegisterError::NoPose("the batch was empty".into())))
-    }
-
-    fn register_batch(
-        &self,
-        pairs: &[(&PointCloud, &PointCloud)],
-    ) -> Vec<Result<Registration, RegisterError>> {
-        pairs.iter().map(|pair| self.register_one(pair.0, pair.1)).collect()
-    }
-}
-
-impl SrrfRegister {
-    fn register_one(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
-        source.check_rotation_observable().map_err(RegisterError::Source)?;
-        target.check_rotation_observable().map_err(RegisterError::Target)?;
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
         let points = source.len().min(target.len()).min(self.max_points);
-        let (source, target) = (subsample(source, points)?, subsample(target, points)?);
+        let (source, target) = (subsample(&source, points)?, subsample(&target, points)?);
         let mut found: Option<Registration> = None;
         let passes = self.passes.max(1);
         for pass in 1..=passes {

@@ -151,7 +151,6 @@ mod tests {
     };
 
     use super::*;
-    use crate::RefineConfig;
     use crate::matching::{both_sides, support};
     use crate::prepared::{Prepared, to_local};
 
@@ -175,8 +174,7 @@ mod tests {
     }
 
     fn between(source: &PointCloud, target: &PointCloud, pose: &Rigid) -> AffineFit {
-        let prepared = |cloud| Prepared::new(cloud, &RefineConfig::default()).unwrap();
-        let (source, target) = (prepared(source), prepared(target));
+        let (source, target) = (Prepared::of(source), Prepared::of(target));
         let (source, target, pose) = (source.coarse(), target.coarse(), to_local(pose, &source, &target));
         let support = support(&both_sides(source, target, &pose), source.spacing.max(target.spacing));
         affine_fit(source, target, &pose, support)
@@ -204,8 +202,8 @@ mod tests {
         let n = source.points().len() as f64;
         let spread = source.points().iter().map(|p| Vector3::from(*p).norm_squared()).sum::<f64>() / n;
         // What the map bends, by its definition, in root mean square over the points.
-        let prepared = Prepared::new(&source, &RefineConfig::default()).unwrap();
-        let spacing = Prepared::new(&target, &RefineConfig::default()).unwrap().coarse().spacing;
+        let prepared = Prepared::of(&source);
+        let spacing = Prepared::of(&target).coarse().spacing;
         let spacing = spacing.max(prepared.coarse().spacing);
         let want = bend(prepared.coarse(), &Affine { linear, shift: Vector3::zeros() }) / spacing;
         assert!(

@@ -150,7 +150,6 @@ mod tests {
     use srrf_cloud::PointCloud;
 
     use super::*;
-    use crate::RefineConfig;
     use crate::prepared::Prepared;
 
     /// Points where `at` puts pairs of numbers in [0, 1), `n` of them, of one sampling.
@@ -161,8 +160,7 @@ mod tests {
 
     /// The structure at the identity, of clouds that stay where they are.
     fn structure(source: Vec<[f64; 3]>, target: Vec<[f64; 3]>) -> ResidualStructure {
-        let prepared =
-            |points| Prepared::new(&PointCloud::new(points).unwrap(), &RefineConfig::default()).unwrap();
+        let prepared = |points| Prepared::of(&PointCloud::new(points).unwrap());
         let (source, target) = (prepared(source), prepared(target));
         let pose = crate::prepared::to_local(&Rigid::identity(), &source, &target);
         residual_structure(source.coarse(), target.coarse(), &pose)

@@ -165,7 +165,6 @@ mod tests {
     use srrf_cloud::PointCloud;
 
     use super::*;
-    use crate::RefineConfig;
     use crate::prepared::{Prepared, to_local};
 
     /// Points of a saddle, by chance.
@@ -175,7 +174,7 @@ mod tests {
             let [x, y]: [f64; 2] = rng.random();
             [x, y, 0.4 * (x - 0.5) * (y - 0.4)]
         });
-        Prepared::new(&PointCloud::new(points.collect()).unwrap(), &RefineConfig::default()).unwrap()
+        Prepared::of(&PointCloud::new(points.collect()).unwrap())
     }
 
     #[test]

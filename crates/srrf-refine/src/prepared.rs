@@ -1,7 +1,9 @@
 //! [`Prepared`]: a cloud centred, thinned, indexed, with normals.
 
 use nalgebra::Vector3;
-use srrf_cloud::{CloudError, KnnIndex, PointCloud, Rigid, estimate_normals, spacing_of, voxel_downsample};
+use srrf_cloud::{
+    CloudError, KnnIndex, PointCloud, Rigid, Solid, estimate_normals, spacing_of, voxel_downsample,
+};
 
 use crate::RefineConfig;
 
@@ -43,8 +45,7 @@ pub(crate) struct Prepared {
 }
 
 impl Prepared {
-    pub fn new(cloud: &PointCloud, config: &RefineConfig) -> Result<Self, CloudError> {
-        cloud.check_rotation_observable()?;
+    pub fn new(cloud: Solid<'_>, config: &RefineConfig) -> Result<Self, CloudError> {
         let centre = cloud.centroid();
         let centred: Vec<[f64; 3]> =
             cloud.points().iter().map(|p| (Vector3::from(*p) - centre).into()).collect();
@@ -59,6 +60,12 @@ impl Prepared {
             None
         };
         Ok(Self { centre, radius, coarse, fine })
+    }
+
+    /// A cloud of tests, with the default settings.
+    #[cfg(test)]
+    pub fn of(cloud: &PointCloud) -> Self {
+        Self::new(Solid::new(cloud).unwrap(), &RefineConfig::default()).unwrap()
     }
 
     pub fn coarse(&self) -> &Level {

@@ -1,6 +1,6 @@
 //! [`Refined`]: any method with a refinement behind it.
 
-use srrf_cloud::{Branch, PointCloud, Register, RegisterError, Registration, Rigid};
+use srrf_cloud::{Branch, Register, RegisterError, Registration, Rigid, Solid};
 
 use crate::{RefineConfig, RefineTarget};
 
@@ -29,8 +29,8 @@ impl<R: Register> Refined<R> {
     fn refined(
         &self,
         found: Registration,
-        source: &PointCloud,
-        target: &PointCloud,
+        source: Solid<'_>,
+        target: Solid<'_>,
     ) -> Result<Registration, RegisterError> {
         let mut starts: Vec<(&str, Rigid)> = vec![("answer", found.target_from_source)];
         starts.extend(found.branches.iter().map(|b| (b.name, b.target_from_source)));
@@ -60,15 +60,7 @@ impl<R: Register> Register for Refined<R> {
         &self.name
     }
 
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
-        self.refined(self.inner.register(source, target)?, source, target)
-    }
-
-    fn register_batch(
-        &self,
-        pairs: &[(&PointCloud, &PointCloud)],
-    ) -> Vec<Result<Registration, RegisterError>> {
-        let found = self.inner.register_batch(pairs);
-        found.into_iter().zip(pairs).map(|(found, (s, t))| self.refined(found?, s, t)).collect()
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
+        self.refined(self.inner.register_solid(source, target)?, source, target)
     }
 }

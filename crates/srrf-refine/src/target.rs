@@ -1,6 +1,6 @@
 //! [`RefineTarget`] and [`RefineSource`]: clouds made ready, and [`refine`] for one pair.
 
-use srrf_cloud::{PointCloud, Rigid};
+use srrf_cloud::{PointCloud, Rigid, Solid};
 
 use crate::evidence::{Evidence, evidence};
 use crate::prepared::Prepared;
@@ -24,8 +24,8 @@ impl RefineTarget {
     /// Centres, thins and indexes the target and estimates its normals.
     ///
     /// # Errors
-    /// [`RefineError::Config`], and [`RefineError::Target`] for a cloud that determines no rotation.
-    pub fn new(target: &PointCloud, config: &RefineConfig) -> Result<Self, RefineError> {
+    /// [`RefineError::Config`], and [`RefineError::Target`] for a cloud that spans more than the largest number.
+    pub fn new(target: Solid<'_>, config: &RefineConfig) -> Result<Self, RefineError> {
         config.validate()?;
         let prepared = Prepared::new(target, config).map_err(RefineError::Target)?;
         Ok(Self { config: *config, prepared })
@@ -39,8 +39,8 @@ impl RefineTarget {
     /// Makes a source ready in the same way.
     ///
     /// # Errors
-    /// [`RefineError::Source`] for a cloud that determines no rotation.
-    pub fn source(&self, source: &PointCloud) -> Result<RefineSource, RefineError> {
+    /// [`RefineError::Source`] for a cloud that spans more than the largest number.
+    pub fn source(&self, source: Solid<'_>) -> Result<RefineSource, RefineError> {
         let prepared = Prepared::new(source, &self.config).map_err(RefineError::Source)?;
         Ok(RefineSource { prepared })
     }
@@ -53,9 +53,9 @@ impl RefineTarget {
     /// Refines the best of `starts`: named poses that map the source near the target.
     ///
     /// # Errors
-    /// [`RefineError::Source`] for a cloud that determines no rotation, [`RefineError::NoStart`] without
-    /// starts, [`RefineError::Start`] for one that is not finite.
-    pub fn refine(&self, source: &PointCloud, starts: &[(&str, Rigid)]) -> Result<Refinement, RefineError> {
+    /// As [`RefineTarget::source`]; [`RefineError::NoStart`] without starts, [`RefineError::Start`] for one that is
+    /// not finite.
+    pub fn refine(&self, source: Solid<'_>, starts: &[(&str, Rigid)]) -> Result<Refinement, RefineError> {
         let source = self.source(source)?;
         self.finish(&source, &self.shortlist(&source, starts)?)
     }
@@ -108,5 +108,7 @@ pub fn refine(
     starts: &[(&str, Rigid)],
     config: &RefineConfig,
 ) -> Result<Refinement, RefineError> {
+    let target = Solid::new(target).map_err(RefineError::Target)?;
+    let source = Solid::new(source).map_err(RefineError::Source)?;
     RefineTarget::new(target, config)?.refine(source, starts)
 }

@@ -6,7 +6,7 @@ use std::error::Error;
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-use srrf_cloud::{EulerXyz, KnnIndex, PointCloud, Register, RegisterError, Registration, Rigid};
+use srrf_cloud::{EulerXyz, KnnIndex, PointCloud, Register, RegisterError, Registration, Rigid, Solid};
 use srrf_corrupt::{CorruptError, Corrupted, Corruption, Severity};
 use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
 use srrf_refine::{RefineConfig, Refined};
@@ -46,11 +46,9 @@ impl Register for PrincipalAxes {
         "principal-axes"
     }
 
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
-        source.check_rotation_observable().map_err(RegisterError::Source)?;
-        target.check_rotation_observable().map_err(RegisterError::Target)?;
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
         let index = KnnIndex::new(target.points()).map_err(RegisterError::Target)?;
-        let (from, to) = (axes(source), axes(target));
+        let (from, to) = (axes(&source), axes(&target));
         let (a, b) = (source.centroid(), target.centroid());
         let signs = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
         let best = signs

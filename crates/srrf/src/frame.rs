@@ -1,7 +1,7 @@
 //! The frame in which a pair is registered: each cloud about a centre of its own, in the input's unit.
 
 use nalgebra::Vector3;
-use srrf_cloud::{CloudError, PointCloud, Rigid};
+use srrf_cloud::{CloudError, PointCloud, Rigid, Solid};
 
 /// A cloud moved to its own centre, and where that is.
 #[derive(Debug, Clone)]
@@ -29,6 +29,14 @@ impl Centred {
         let centre: [f64; 3] = std::array::from_fn(|c| low[c] / 2.0 + high[c] / 2.0);
         let moved = cloud.points().iter().map(|p| std::array::from_fn(|c| p[c] - centre[c])).collect();
         Ok(Self { cloud: PointCloud::new(moved)?, centre: centre.into() })
+    }
+
+    /// The centred cloud, checked to determine a rotation.
+    ///
+    /// # Errors
+    /// As [`Solid::new`].
+    pub fn solid(&self) -> Result<Solid<'_>, CloudError> {
+        Solid::new(&self.cloud)
     }
 }
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use srrf_classical::{FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
-use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, Skeletons};
+use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, Skeletons, Solid};
 use srrf_refine::{Ranking, RefineError, RefineTarget};
 
 use crate::frame::{Centred, from_input, to_input};
@@ -97,11 +97,12 @@ impl Registrar {
     /// [`Error::Target`] for a cloud that determines no rotation.
     pub fn prepare(&self, target: &PointCloud) -> Result<Target, Error> {
         let begun = Instant::now();
-        target.check_rotation_observable().map_err(Error::Target)?;
-        let centred = Centred::new(target).map_err(Error::Target)?;
+        let target = Solid::new(target).map_err(Error::Target)?;
+        let centred = Centred::new(&target).map_err(Error::Target)?;
         let thin = thinned(&centred.cloud);
         let config = self.options.refine.unwrap_or_default();
-        let refine = RefineTarget::new(&centred.cloud, &config).map_err(Error::Refine)?;
+        let refine =
+            RefineTarget::new(centred.solid().map_err(Error::Target)?, &config).map_err(Error::Refine)?;
         Ok(Target { centred, thin, refine, points: target.len(), seconds: begun.elapsed().as_secs_f64() })
     }
 
@@ -110,7 +111,7 @@ impl Registrar {
     /// # Errors
     /// [`Error`] for clouds that determine no rotation, and where no pose is found.
     pub fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Outcome, Error> {
-        source.check_rotation_observable().map_err(Error::Source)?;
+        Solid::new(source).map_err(Error::Source)?;
         self.register_to(source, &self.prepare(target)?)
     }
 
@@ -134,11 +135,11 @@ impl Registrar {
     ) -> Result<Outcome, Error> {
         let mut clock = Clock::new();
         clock.times.push(StageTime { stage: "prepare target", seconds: target.seconds });
-        source.check_rotation_observable().map_err(Error::Source)?;
-        let centred = Centred::new(source).map_err(Error::Source)?;
+        let source = Solid::new(source).map_err(Error::Source)?;
+        let centred = Centred::new(&source).map_err(Error::Source)?;
         let thin = thinned(&centred.cloud);
         let given = from_input(given, &centred, &target.centred);
-        let refine = target.refine.source(&centred.cloud).map_err(Error::Refine)?;
+        let refine = target.refine.source(centred.solid().map_err(Error::Source)?).map_err(Error::Refine)?;
         let mut search = Search::new(&target.refine, refine, self.options.refine.is_some());
         clock.lap("prepare source");
 
@@ -279,7 +280,10 @@ impl Registrar {
             hypotheses: WIDE,
             ..FpfhRansacConfig::default()
         };
-        let found = FpfhRansac::new(config).hypotheses(&source.cloud, &target.centred.cloud)?;
+        let found = FpfhRansac::new(config).hypotheses(
+            source.solid().map_err(RegisterError::Source)?,
+            target.centred.solid().map_err(RegisterError::Target)?,
+        )?;
         let poses = match self.options.rotation {
             RotationRange::Any => found.poses,
             RotationRange::Within45 => within(found.poses, given)?,

@@ -80,7 +80,7 @@ impl<'a> Search<'a> {
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::EulerXyz;
+    use srrf_cloud::{EulerXyz, Solid};
     use srrf_corrupt::shapes::ProceduralShapes;
     use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream};
 
@@ -101,8 +101,10 @@ mod tests {
         };
         let start = |name: &str, by: &Rigid| (name.to_owned(), by.compose(&truth));
 
-        let target = RefineTarget::new(&pair.target, &Options::default().refine.unwrap()).unwrap();
-        let mut search = Search::new(&target, target.source(&pair.source).unwrap(), true);
+        let config = Options::default().refine.unwrap();
+        let target = RefineTarget::new(Solid::new(&pair.target).unwrap(), &config).unwrap();
+        let source = target.source(Solid::new(&pair.source).unwrap()).unwrap();
+        let mut search = Search::new(&target, source, true);
         search
             .add(&[start("off", &off([90.0, 60.0, 20.0])), start("more", &off([-70.0, 40.0, 110.0]))])
             .unwrap();

@@ -1,6 +1,6 @@
 //! [`skeleton`]: the spheres along the middle of a shape that the network's first stage sees.
 
-use srrf_cloud::{CloudError, PointCloud};
+use srrf_cloud::{CloudError, PointCloud, Solid};
 use srrf_model::PairBatch;
 use srrf_model::ops::even_subsample;
 
@@ -29,10 +29,10 @@ pub struct Skeleton {
 /// [`Error::Setup`] for unknown weights or devices, [`Error::Source`] for a cloud of fewer than three
 /// points or on one line, [`Error::NoPose`] where the network's answer is not finite.
 pub fn skeleton(cloud: &PointCloud, weights: Option<&str>, device: &str) -> Result<Skeleton, Error> {
-    cloud.check_rotation_observable().map_err(Error::Source)?;
+    let cloud = Solid::new(cloud).map_err(Error::Source)?;
     let loaded = open(weights, device).map_err(Error::Setup)?;
     let device = srrf_model::device(device).map_err(|e| Error::Setup(e.to_string()))?;
-    let centred = Centred::new(cloud).map_err(Error::Source)?;
+    let centred = Centred::new(&cloud).map_err(Error::Source)?;
     let seen = subsample(&thinned(&centred.cloud)).map_err(Error::Source)?;
     let not_finite = || Error::NoPose("the skeleton is not finite; are the coordinates extreme?".into());
     let batch = PairBatch::new(&[(&seen, &seen)], &device).ok_or_else(not_finite)?;

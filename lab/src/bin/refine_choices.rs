@@ -15,7 +15,7 @@ use nalgebra::Matrix3;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
-use srrf_cloud::{EulerXyz, PointCloud, Register, Rigid};
+use srrf_cloud::{EulerXyz, PointCloud, Register, Rigid, Solid};
 use srrf_corrupt::crop::{crop, random_direction, visible};
 use srrf_corrupt::datasets::{ShapeSource, Split, VALIDATION_SHAPES, held_out, open};
 use srrf_corrupt::shapes::ProceduralShapes;
@@ -89,7 +89,8 @@ fn main() {
                 ..rule
             };
             let by = |config: &RefineConfig, starts: &[(&str, Rigid)]| {
-                RefineTarget::new(&pair.target, config).unwrap().refine(&pair.source, starts).unwrap()
+                let (source, target) = (Solid::new(&pair.source).unwrap(), Solid::new(&pair.target).unwrap());
+                RefineTarget::new(target, config).unwrap().refine(source, starts).unwrap()
             };
             let (rule, full) = (by(&rule, &starts), by(&full, &starts));
             let cautious = by(&cautious, &[("start", winner(&full, &starts))]);

@@ -156,9 +156,7 @@ impl Stage<'_> {
             Some(threads) => threads,
             None => std::thread::available_parallelism().map_or(1, usize::from),
         };
-        let batch = self.options.batch.max(1);
-        let run =
-            Run { pairs, methods, transforms: Vec::new(), rows, batch, threads, cache: Some(self.cache) };
+        let run = Run { pairs, methods, transforms: Vec::new(), rows, threads, cache: Some(self.cache) };
         let outcome = run.execute(&mut |done, group| say(Progress::Done(done, group)))?;
         Ok(Measured { summary: Summary::of(&outcome)?, outcome, data: pairs.description() })
     }

@@ -107,7 +107,7 @@ impl PairSource for SampledPairs<'_> {
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::{RegisterError, Registration, Rigid, Skeleton, Skeletons};
+    use srrf_cloud::{RegisterError, Registration, Rigid, Skeleton, Skeletons, Solid};
     use srrf_corrupt::PairConfig;
 
     use super::*;
@@ -122,11 +122,15 @@ mod tests {
             "first-five"
         }
 
-        fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
+        fn register_solid(
+            &self,
+            source: Solid<'_>,
+            target: Solid<'_>,
+        ) -> Result<Registration, RegisterError> {
             let five = |cloud: &PointCloud| cloud.points()[..5].to_vec();
             let skeletons = Some(Skeletons {
-                source: Skeleton { points: five(source), radii: Vec::new() },
-                target: Skeleton { points: five(target), radii: Vec::new() },
+                source: Skeleton { points: five(&source), radii: Vec::new() },
+                target: Skeleton { points: five(&target), radii: Vec::new() },
             });
             Ok(Registration { skeletons, ..Registration::from_pose(Rigid::identity()) })
         }

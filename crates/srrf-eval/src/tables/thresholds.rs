@@ -1,6 +1,6 @@
 //! The ablation of the integration: inlier test, its threshold, and no weighing at all.
 
-use srrf_cloud::{PointCloud, Register, RegisterError, Registration};
+use srrf_cloud::{Register, RegisterError, Registration, Solid};
 use srrf_corrupt::CorruptionKind;
 use srrf_model::{InlierTest, IntegrationConfig, SrrfRegister};
 
@@ -46,8 +46,8 @@ impl Register for Named {
         self.name
     }
 
-    fn register(&self, source: &PointCloud, target: &PointCloud) -> Result<Registration, RegisterError> {
-        self.inner.register(source, target)
+    fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
+        self.inner.register_solid(source, target)
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use srrf_cloud::io::{
     CloudFile, IoError, Kept, is_cloud_file, write_atomically, write_cloud, write_cloud_to,
 };
-use srrf_cloud::{CloudError, PointCloud, Rigid};
+use srrf_cloud::{CloudError, PointCloud, Rigid, Solid};
 
 use super::failure::Failure;
 use super::interrupt;
@@ -68,7 +68,7 @@ fn nothing_left(file: &CloudFile, path: PathBuf) -> Failure {
 /// As [`read`]; also for fewer than three points and for points on one line.
 pub fn read_solid(path: &Path, format: Option<&str>) -> Result<Input, Failure> {
     let input = read(path, format)?;
-    input.cloud.check_rotation_observable().map_err(|e| Failure::cloud(&input.name, &e))?;
+    Solid::new(&input.cloud).map_err(|e| Failure::cloud(&input.name, &e))?;
     Ok(input)
 }
 

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use serde_json::{Value, json};
+use srrf_cloud::Solid;
 
 use super::Common;
 use super::failure::Failure;
@@ -70,7 +71,7 @@ fn to_json(input: &Input, statistics: &Statistics) -> Value {
         map.insert("format".into(), json!(input.file.format()));
         map.insert("dropped_points".into(), json!(input.dropped));
         map.insert("suggestions".into(), json!(statistics.suggestions()));
-        map.insert("determines_rotation".into(), json!(input.cloud.check_rotation_observable().is_ok()));
+        map.insert("determines_rotation".into(), json!(Solid::new(&input.cloud).is_ok()));
     }
     value
 }
@@ -115,7 +116,7 @@ fn to_text(input: &Input, s: &Statistics) -> String {
             s.roughness
         ),
     );
-    if let Err(e) = input.cloud.check_rotation_observable() {
+    if let Err(e) = Solid::new(&input.cloud) {
         line("warning", format!("it cannot be registered: {e}"));
     }
     let suggestions = s.suggestions();
