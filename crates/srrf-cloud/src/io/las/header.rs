@@ -1,11 +1,9 @@
 //! The header of a LAS file and its variable length records.
 
-use std::borrow::Cow;
-
 use laz::LazVlr;
 
 use super::super::FormatError;
-use super::zipped;
+use super::laz_record;
 
 /// Bytes of the header of versions 1.0 to 1.2, and of 1.4.
 const HEADER: usize = 227;
@@ -107,20 +105,6 @@ impl Header {
         Ok(self)
     }
 
-    /// The points, uncompressed.
-    pub fn records<'a>(&self, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>, FormatError> {
-        if self.zipped {
-            return zipped::decompress(self, self.laz(bytes)?, bytes).map(Cow::Owned);
-        }
-        let body = &bytes[self.points_at..];
-        let length = usize::try_from(self.points).ok().and_then(|n| n.checked_mul(self.record_length));
-        let records = length.and_then(|length| body.get(..length)).ok_or_else(|| {
-            let found = format!("{} bytes", body.len());
-            FormatError::truncated(format!("{} points of {} bytes", self.points, self.record_length), found)
-        })?;
-        Ok(Cow::Borrowed(records))
-    }
-
     /// What says how the points are compressed.
     pub fn laz(&self, bytes: &[u8]) -> Result<LazVlr, FormatError> {
         let mut at = self.length;
@@ -132,7 +116,7 @@ impl Header {
             }
             let id = word(bytes, at + 18).map(u16::from_le_bytes);
             if bytes[at + 2..].starts_with(LazVlr::USER_ID.as_bytes()) && id == Some(LazVlr::RECORD_ID) {
-                return zipped::vlr(&bytes[content], self.record_length);
+                return laz_record::vlr(&bytes[content], self.record_length);
             }
             at = content.end;
         }
@@ -202,9 +186,9 @@ pub(super) fn new_header(
         .map(|p| std::array::from_fn(|axis| axes[axis].value(axes[axis].steps(p[axis]))))
         .collect();
     put_axes(&mut bytes, axes, &rounded);
-    let vlr = if zipped { Some(zipped::new_vlr()?) } else { None };
+    let vlr = if zipped { Some(laz_record::new_vlr()?) } else { None };
     if let Some(vlr) = &vlr {
-        let content = zipped::vlr_bytes(vlr)?;
+        let content = laz_record::vlr_bytes(vlr)?;
         let mut record = vec![0; VLR];
         put_word(&mut record, 2, LazVlr::USER_ID.as_bytes());
         put_word(&mut record, 18, &LazVlr::RECORD_ID.to_le_bytes());

@@ -3,8 +3,10 @@
 //! words); the compression of LAZ is that of the `laz` crate.
 
 mod header;
+mod laz_record;
 mod zipped;
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 
 use self::header::{Axis, Header};
@@ -77,7 +79,21 @@ impl CloudFormat for Laz {
 
 fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
     let header = Header::parse(bytes)?;
-    Ok(points(&header, &header.records(bytes)?))
+    Ok(points(&header, &records(&header, bytes)?))
+}
+
+/// The points of a file as records, uncompressed.
+fn records<'a>(header: &Header, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>, FormatError> {
+    if header.zipped {
+        return zipped::decompress(header, header.laz(bytes)?, bytes).map(Cow::Owned);
+    }
+    let body = &bytes[header.points_at..];
+    let length = usize::try_from(header.points).ok().and_then(|n| n.checked_mul(header.record_length));
+    let records = length.and_then(|length| body.get(..length)).ok_or_else(|| {
+        let found = format!("{} bytes", body.len());
+        FormatError::truncated(format!("{} points of {} bytes", header.points, header.record_length), found)
+    })?;
+    Ok(Cow::Borrowed(records))
 }
 
 /// The points of uncompressed records.
@@ -147,7 +163,7 @@ fn put_points(points: &[[f64; 3]], axes: &[Axis; 3], length: usize, records: &mu
 
 fn rewritten(bytes: &[u8], motion: &Rigid) -> io::Result<Vec<u8>> {
     let header = Header::parse(bytes)?;
-    let mut records = header.records(bytes)?.into_owned();
+    let mut records = records(&header, bytes)?.into_owned();
     let old = points(&header, &records);
     let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
     if old == new {

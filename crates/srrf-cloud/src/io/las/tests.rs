@@ -48,7 +48,7 @@ fn version_1_4_zipped() -> Vec<u8> {
     let plain = version_1_4();
     let items = laz::LazItemRecordBuilder::default_for_point_format_id(7, 1).unwrap();
     let vlr = laz::LazVlr::from_laz_items(items);
-    let content = zipped::vlr_bytes(&vlr).unwrap();
+    let content = laz_record::vlr_bytes(&vlr).unwrap();
     let mut bytes = plain[..375].to_vec();
     bytes[104] |= 0x80;
     bytes[100..104].copy_from_slice(&1u32.to_le_bytes());
@@ -96,7 +96,7 @@ fn a_moved_copy_keeps_the_rest() {
         assert!(distance(&read(&copy).unwrap(), &new) <= 0.000_011);
         assert_eq!(rewritten(&bytes, &Rigid::identity()).unwrap(), bytes);
         let (before, after) = (Header::parse(&bytes).unwrap(), Header::parse(&copy).unwrap());
-        let (a, b) = (before.records(&bytes).unwrap(), after.records(&copy).unwrap());
+        let (a, b) = (records(&before, &bytes).unwrap(), records(&after, &copy).unwrap());
         for (a, b) in a.chunks(before.record_length).zip(b.chunks(after.record_length)) {
             assert_eq!(a[12..], b[12..], "attributes");
         }
