@@ -53,7 +53,7 @@ impl Register for Icp {
     fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
         let neighbours = KnnIndex::new(target.points()).map_err(RegisterError::Target)?;
         let limit = self.config.max_distance.map_or(f64::INFINITY, |d| d * d);
-        let step_limit = self.config.tolerance * rms_radius(target);
+        let step_limit = self.config.tolerance * rms_radius(&target);
 
         let mut pose = Rigid::identity();
         if self.config.centred {
@@ -80,7 +80,7 @@ impl Register for Icp {
                     limit.sqrt()
                 ))
             })?;
-            let step = rms_between(source, &pose, &next);
+            let step = rms_between(&source, &pose, &next);
             pose = next;
             if step <= step_limit {
                 return Ok(answer(pose, true, iteration));

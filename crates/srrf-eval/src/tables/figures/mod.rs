@@ -226,7 +226,6 @@ mod tests {
             methods: &[],
             transforms: vec![],
             rows: vec!["oracle".into()],
-            batch: 2,
             threads: 1,
             cache: None,
         };
