@@ -6,6 +6,7 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::ops::even_tokens;
 use srrf_model::{NetworkConfig, WrongSize, procrustes, registration_loss, soft_matches};
@@ -15,7 +16,7 @@ use crate::learned::{LearnedConfig, Lesson, Pose};
 use crate::pre_norm::Transformer;
 
 /// Which DCP.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DcpVersion {
     /// Without interaction of the clouds.
@@ -25,23 +26,29 @@ pub enum DcpVersion {
 }
 
 /// Sizes of [`Dcp`]. Defaults are those of the authors' code.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DcpConfig {
     /// v1 or v2. Default `v2`.
     pub version: DcpVersion,
     /// Points of each cloud that carry features, chosen evenly; 0 (default) for all. The others still
     /// serve as neighbours.
+    #[schemars(range(min = 0, max = 65536))]
     pub tokens: usize,
     /// Neighbours of each point, itself included. Default 20.
+    #[schemars(range(min = 1, max = 1024))]
     pub neighbours: usize,
     /// Widths of the layers on the edges. Default 64, 64, 128, 256.
+    #[schemars(length(min = 1, max = 64), inner(range(min = 1, max = 8192)))]
     pub widths: Vec<usize>,
     /// Width of the embedding. Default 512.
+    #[schemars(range(min = 1, max = 8192))]
     pub width: usize,
     /// Heads of the transformer. Default 4.
+    #[schemars(range(min = 1, max = 64))]
     pub heads: usize,
     /// Width inside its feed-forward layers. Default 1,024.
+    #[schemars(range(min = 1, max = 8192))]
     pub feed_forward: usize,
 }
 
@@ -60,10 +67,11 @@ impl Default for DcpConfig {
 }
 
 /// Weights of the losses of [`Dcp`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DcpLosses {
     /// `|R^T R_gt - I|^2 + |t - t_gt|^2`, means over 9 and 3 elements. The paper: 1.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub registration: f64,
 }
 

@@ -4,6 +4,7 @@ use std::fmt::Debug;
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use srrf_cloud::{Register, RegisterError, Registration, Solid};
@@ -38,9 +39,9 @@ pub struct Pose {
 }
 
 /// The sizes of a learned baseline, which say how it learns and how it answers.
-pub trait LearnedConfig: NetworkConfig {
+pub trait LearnedConfig: NetworkConfig + JsonSchema {
     /// Weights of its losses.
-    type Losses: Clone + Debug + PartialEq + Serialize + DeserializeOwned + Send + Sync;
+    type Losses: Clone + Debug + PartialEq + Serialize + DeserializeOwned + JsonSchema + Send + Sync;
     /// Name of the method, in configurations and tables.
     const NAME: &'static str;
     /// Names of the losses.

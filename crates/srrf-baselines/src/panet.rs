@@ -11,6 +11,7 @@ use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
 use srrf_model::ops::{HostClouds, even_tokens, flat_indices, k_nearest, rows};
@@ -21,21 +22,27 @@ use crate::learned::{LearnedConfig, Lesson, Pose};
 use crate::se3::{compose, rotation_of};
 
 /// Sizes of [`Panet`]. Defaults are those of the authors' code.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PanetConfig {
     /// Points of each cloud that carry features, chosen evenly; 0 (default) for all. The others still
     /// serve as neighbours.
+    #[schemars(range(min = 0, max = 65536))]
     pub tokens: usize,
     /// Neighbours of the scales, the largest first. Default 16, 8.
+    #[schemars(length(min = 1, max = 16), inner(range(min = 1, max = 1024)))]
     pub scales: Vec<usize>,
     /// Widths of the layers on the edges. Default 64, 64, 128, 256.
+    #[schemars(length(min = 1, max = 64), inner(range(min = 1, max = 8192)))]
     pub widths: Vec<usize>,
     /// Width of the global feature. Default 512.
+    #[schemars(range(min = 1, max = 8192))]
     pub width: usize,
     /// Widths of the regression. Default 1,024, 512, 512, 256.
+    #[schemars(length(max = 64), inner(range(min = 1, max = 8192)))]
     pub head: Vec<usize>,
     /// Iterations. Default 4.
+    #[schemars(range(min = 1, max = 1000))]
     pub iterations: usize,
 }
 
@@ -53,10 +60,11 @@ impl Default for PanetConfig {
 }
 
 /// Weights of the losses of [`Panet`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PanetLosses {
     /// Mean absolute difference of the coordinates of the source under the found and the true pose.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub points: f64,
 }
 

@@ -1,9 +1,10 @@
 //! [`Variants`]: where the paper's text and the reference code differ.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How `density_inc` makes a region denser.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DensityInc {
     /// The paper's text: clusters gain new points with random offsets.
@@ -16,7 +17,7 @@ pub enum DensityInc {
 }
 
 /// The named choices; the default is the paper's text throughout.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Variants {
     /// The two readings of `density_inc`.
@@ -24,12 +25,15 @@ pub struct Variants {
     /// Largest offset of a new point of `density_inc` on each coordinate, canonical unit; only
     /// for [`DensityInc::PaperText`]. The paper gives no number: 0.02 keeps the new points within
     /// the median spacing of 1,024 points on a unit-sphere shape, 0.031.
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub density_inc_offset: f64,
     /// Displacement of an `impulse` point on each coordinate, canonical unit. Paper: 0.05;
     /// ModelNet40-C: 0.1.
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub impulse_linf: f64,
     /// Largest offset of an `upsampling` point on each coordinate, canonical unit. Paper: 0.08;
     /// ModelNet40-C: 0.05.
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub upsampling_linf: f64,
 }
 

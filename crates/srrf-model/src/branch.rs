@@ -3,6 +3,7 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::confidence::Confidence;
@@ -17,11 +18,12 @@ use crate::sfe::{Neighbourhood, Sfe, SfeConfig};
 use crate::timing::timed;
 
 /// Sizes of one branch.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BranchConfig {
     /// Points of each cloud that carry features; 0 for all, as in the paper. Attention costs the
     /// square of it. The others still serve as neighbours in the first LFI.
+    #[schemars(range(min = 0, max = 65536))]
     pub tokens: usize,
     /// Whether source points count in the SVD head by a learned confidence; the paper: no.
     #[serde(default)]

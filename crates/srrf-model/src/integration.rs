@@ -3,6 +3,7 @@
 
 use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::defaults;
@@ -10,7 +11,7 @@ use crate::ops::{HostClouds, share_within};
 use crate::procrustes::{nearest_rotation, transform};
 
 /// Which points the inlier test of a branch looks at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InlierTest {
     /// The paper's words: a correspondence `x_i -> yhat_i` is an inlier when
@@ -30,25 +31,30 @@ pub enum InlierTest {
 }
 
 /// How the two poses are blended.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IntegrationConfig {
     /// The inlier test.
     pub test: InlierTest,
     /// Inlier threshold of the dense branch, in network units (clouds of unit radius). RGM: 0.05.
+    #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub dense_threshold: f64,
     /// Inlier threshold of the skeleton branch, network units; its spacing is 4 times as wide.
+    #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub skeleton_threshold: f64,
     /// Lambda is `g_c^p / (g_c^p + (w g_s)^p)` with this `p`; the paper's is 1.
+    #[schemars(range(min = 0.0, max = 1e4))]
     pub sharpness: f64,
     /// The `w` above. Below 1 the skeleton branch wins only where its pose has that much more inliers: of two poses that
     /// fit about as well, the dense branch's is the better one more often. Default and the paper: 1.
     #[serde(default = "defaults::one", skip_serializing_if = "defaults::is_one")]
+    #[schemars(range(min = 0.0, max = 100.0), extend("default" = 1.0))]
     pub skeleton_weight: f64,
     /// With [`InlierTest::Common`]: lambda is 0 where the skeleton branch is ahead by more than so many standard errors, and 1 elsewhere
     /// (McNemar 1947: of the correspondences that are inliers of one pose alone, `n_s` and `n_c`, that is
     /// `n_s - n_c > z sqrt(n_s + n_c)`). Default: none, lambda weighs the ratios.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e4))]
     pub standard_errors: Option<f64>,
 }
 

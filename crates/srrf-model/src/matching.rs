@@ -3,6 +3,7 @@
 use burn::module::{Module, Param};
 use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::inference::Matches;
@@ -15,7 +16,7 @@ const SHARPNESS: f64 = 2.0;
 const SLACK: f64 = 4.0;
 
 /// How scores become probabilities. The default is the paper: a softmax of each row.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MatchingConfig {
     /// Whether the scores of a pair are brought to mean 0 and standard deviation 1 before the learned
@@ -25,6 +26,7 @@ pub struct MatchingConfig {
     /// Sinkhorn iterations with slack before the softmax; 0 for none. They let target points take part in one
     /// match alone, and source points in none: RPMNet and RGM, 5 and 20.
     #[serde(default)]
+    #[schemars(range(max = 1000))]
     pub sinkhorn: usize,
 }
 

@@ -5,25 +5,31 @@ use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::activation::{relu, sigmoid};
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::attention::{DecoderLayer, EncoderLayer};
 use crate::fast::{Activation, linear};
 
 /// Sizes of the feature interaction.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PfiConfig {
     /// Encoder and decoder blocks. DIT uses 12 at a learning rate of 3e-5, DCP 1 at 1e-3; the
     /// paper's rate is DCP's.
+    #[schemars(range(max = 64))]
     pub blocks: usize,
     /// Attention heads; must divide the feature width. DCP uses 4.
+    #[schemars(range(min = 1, max = 64))]
     pub heads: usize,
     /// Width inside the feed-forward layers. DCP: twice the feature width.
+    #[schemars(range(min = 1, max = 8192))]
     pub feed_forward: usize,
     /// Width inside the position encoding. DIT uses 4,096.
+    #[schemars(range(min = 1, max = 8192))]
     pub position_hidden: usize,
     /// The squeeze divides the channels by this. SENet and DIT use 16.
+    #[schemars(range(min = 1, max = 8192))]
     pub squeeze: usize,
 }
 

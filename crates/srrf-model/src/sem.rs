@@ -5,37 +5,46 @@ use burn::module::Module;
 use burn::nn::{LayerNorm, LayerNormConfig, Linear, LinearConfig};
 use burn::tensor::activation::{relu, softmax};
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::fast::{Activation, gather_max, gather_relu, linear};
 use crate::ops::{HostClouds, farthest_points, flat_indices, k_nearest, nearest_distance, rows};
 
 /// Sizes of one set-abstraction level.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LevelConfig {
     /// Points kept by farthest point sampling.
+    #[schemars(range(min = 1, max = 65536))]
     pub points: usize,
     /// Nearest neighbours that are grouped. Point2Skeleton groups 16 to 128 within radii.
+    #[schemars(range(min = 1, max = 1024))]
     pub neighbours: usize,
     /// Widths of the shared MLP.
+    #[schemars(length(min = 1, max = 64), inner(range(min = 1, max = 8192)))]
     pub widths: Vec<usize>,
 }
 
 /// Sizes of the skeleton extraction module.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SemConfig {
     /// The set-abstraction levels of the encoder. Point2Skeleton: 1024, 768, 512, 512 points.
+    #[schemars(length(min = 1, max = 16))]
     pub levels: Vec<LevelConfig>,
     /// Width of the cloud's global feature, which joins each point's feature before the head.
+    #[schemars(range(min = 1, max = 8192))]
     pub global: usize,
     /// Widths of the weight head. Point2Skeleton: 384, 256, 256, 128.
+    #[schemars(length(max = 64), inner(range(min = 1, max = 8192)))]
     pub head: Vec<usize>,
     /// Skeleton points, the paper's N_X. Point2Skeleton: 100.
+    #[schemars(range(min = 3, max = 8192))]
     pub skeleton_points: usize,
     /// Factor on the logits before the softmax. At 1 every skeleton point sits near the centroid
     /// for hundreds of steps (Point2Skeleton has a BatchNorm there instead).
+    #[schemars(range(max = 1e4), extend("exclusiveMinimum" = 0.0))]
     pub logit_scale: f64,
 }
 

@@ -5,6 +5,7 @@ use burn::module::Module;
 use burn::nn::{LayerNorm, LayerNormConfig, Linear, LinearConfig};
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::attention::EncoderLayer;
@@ -12,18 +13,23 @@ use crate::fast::{Activation, linear};
 use crate::ops::{HostClouds, RowNumbers, flat_indices, k_nearest, rows_at};
 
 /// Sizes of the structural feature extractor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SfeConfig {
     /// Number of LFI + transformer layers, the paper's N_l. DIT, the design's ancestor, uses 8.
+    #[schemars(range(min = 1, max = 64))]
     pub layers: usize,
     /// Neighbours that LFI joins, the point itself included. DIT uses 20.
+    #[schemars(range(min = 1, max = 1024))]
     pub neighbours: usize,
     /// Width of the features inside. DIT uses 64.
+    #[schemars(range(min = 1, max = 8192))]
     pub width: usize,
     /// Attention heads; must divide `width`. DIT uses 4.
+    #[schemars(range(min = 1, max = 64))]
     pub heads: usize,
     /// Width inside the MLP of a transformer layer. DIT uses 64.
+    #[schemars(range(min = 1, max = 8192))]
     pub mlp: usize,
 }
 

@@ -2,6 +2,7 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_cloud::profile::stage;
 
@@ -14,7 +15,7 @@ use crate::sem::{Sem, SemConfig, SemLayout, Skeleton};
 use crate::timing::timed;
 
 /// Sizes of the whole network.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SrrfConfig {
     /// The skeleton extraction module.

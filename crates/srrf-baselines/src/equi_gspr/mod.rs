@@ -22,6 +22,7 @@ use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::activation::sigmoid;
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
 use srrf_model::ops::{even_tokens, rows};
@@ -33,25 +34,33 @@ use graph::GraphLayer;
 pub use matches::PutativeMatches;
 
 /// Sizes of [`EquiGspr`]. Defaults are those of the released script, where it has them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EquiGsprConfig {
     /// Putative matches: points of the source, chosen evenly. Default 256; the script: 2,048.
+    #[schemars(range(min = 1, max = 65536))]
     pub tokens: usize,
     /// Radius of the descriptors, in network units. Default 0.25.
+    #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub feature_radius: f64,
     /// Neighbours of each match in each graph. Default 16.
+    #[schemars(range(min = 1, max = 1024))]
     pub neighbours: usize,
     /// Equivariant layers. Default 3.
+    #[schemars(range(min = 1, max = 64))]
     pub layers: usize,
     /// Width of the features. Default 32.
+    #[schemars(range(min = 1, max = 8192))]
     pub width: usize,
     /// Matches that the pose is made from. Default 128.
+    #[schemars(range(min = 3, max = 65536))]
     pub kept: usize,
     /// Widths of the layers that score a match. Default 32, 16.
+    #[schemars(length(max = 64), inner(range(min = 1, max = 8192)))]
     pub head: Vec<usize>,
     /// A match is right in training if the true pose leaves less than this between its points, in network
     /// units. Default 0.1.
+    #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub match_radius: f64,
 }
 
@@ -71,16 +80,20 @@ impl Default for EquiGsprConfig {
 }
 
 /// Weights of the losses of [`EquiGspr`]. The script: 1 each.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EquiGsprLosses {
     /// Mean angle of the error of the rotation, as its chord: `|R - R_gt| / sqrt(2)`.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub rotation: f64,
     /// Mean error of the translation, network units.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub translation: f64,
     /// Binary cross-entropy of the scores with the true labels.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub scores: f64,
     /// Mean squared difference of the similarities from the true labels.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub similarity: f64,
 }
 

@@ -13,6 +13,7 @@ mod jacobian;
 use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
 use srrf_model::ops::even_tokens;
@@ -23,7 +24,7 @@ use crate::learned::{LearnedConfig, Lesson, Pose};
 use crate::se3::{exp, identity, parts};
 
 /// How the derivative of the target's feature by its pose is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LkJacobian {
     /// Backward differences with a step of 0.01 in each coordinate of the twist: the first paper.
@@ -33,18 +34,22 @@ pub enum LkJacobian {
 }
 
 /// Sizes of [`PointNetLk`]. Defaults are those of the authors' code.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PointNetLkConfig {
     /// Points of each cloud that the network sees, chosen evenly; 0 (default) for all.
+    #[schemars(range(min = 0, max = 65536))]
     pub points: usize,
     /// Widths of the layers. Default 64, 64, 64, 128, 1,024; Revisited: 64, 128, 1,024.
+    #[schemars(length(min = 1, max = 64), inner(range(min = 1, max = 8192)))]
     pub widths: Vec<usize>,
     /// The Jacobian. Default `finite_difference`.
     pub jacobian: LkJacobian,
     /// Iterations in training. Default 10.
+    #[schemars(range(min = 1, max = 1000))]
     pub iterations: usize,
     /// Iterations at test. Default 10; Revisited: 20.
+    #[schemars(range(min = 1, max = 1000))]
     pub test_iterations: usize,
 }
 
@@ -61,12 +66,14 @@ impl Default for PointNetLkConfig {
 }
 
 /// Weights of the losses of [`PointNetLk`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointNetLkLosses {
     /// Squared difference of the features after the last iteration, sum over the features. The paper: 1.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub residual: f64,
     /// Mean of the 16 squared elements of `G G_gt^-1 - I`. The authors' code: 16.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub pose: f64,
 }
 

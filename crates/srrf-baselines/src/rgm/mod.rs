@@ -13,6 +13,7 @@ mod truth;
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::ops::even_tokens;
 use srrf_model::{NetworkConfig, WrongSize, sinkhorn, transform, weighted_procrustes};
@@ -23,30 +24,40 @@ use crate::se3::compose;
 use layer::GraphLayer;
 
 /// Sizes of [`Rgm`]. Defaults are those of the authors' code.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RgmConfig {
     /// Points of each cloud that are nodes, chosen evenly; 0 (default) for all. The others still serve as
     /// neighbours of the features.
+    #[schemars(range(min = 0, max = 65536))]
     pub tokens: usize,
     /// Neighbours of each point in the features, itself included. Default 20.
+    #[schemars(range(min = 1, max = 1024))]
     pub neighbours: usize,
     /// Widths of the layers on the edges. Default 64, 64, 128, 256.
+    #[schemars(length(min = 1, max = 64), inner(range(min = 1, max = 8192)))]
     pub widths: Vec<usize>,
     /// Width of the last layer of the features, and of the nodes after each graph layer. Default 512.
+    #[schemars(range(min = 1, max = 8192))]
     pub width: usize,
     /// Heads of the transformers. Default 4.
+    #[schemars(range(min = 1, max = 64))]
     pub heads: usize,
     /// Width inside their feed-forward layers. Default 1,024.
+    #[schemars(range(min = 1, max = 8192))]
     pub feed_forward: usize,
     /// Graph layers. Default 2.
+    #[schemars(range(min = 1, max = 64))]
     pub layers: usize,
     /// Iterations of Sinkhorn. Default 20.
+    #[schemars(range(min = 1, max = 1000))]
     pub sinkhorn: usize,
     /// Nodes match in training if they are each other's nearest within this distance, in network units,
     /// or, among those without a match, within twice of it. Default 0.05, where every point is a node.
+    #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
     pub match_radius: f64,
     /// Iterations at test. Default 2.
+    #[schemars(range(min = 1, max = 1000))]
     pub iterations: usize,
 }
 
@@ -68,11 +79,12 @@ impl Default for RgmConfig {
 }
 
 /// Weights of the losses of [`Rgm`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RgmLosses {
     /// Binary cross-entropy of the assignment, sum over its entries, over the number of nodes. The
     /// paper: 1.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub assignment: f64,
 }
 

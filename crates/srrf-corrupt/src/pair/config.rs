@@ -1,11 +1,12 @@
 //! [`PairConfig`]: the switches of pair synthesis.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{InvalidVariant, Variants};
 
 /// Which cloud of a pair is corrupted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Corrupt {
     /// Both, with independent draws (the paper's figure 1).
@@ -18,7 +19,7 @@ pub enum Corrupt {
 }
 
 /// Where the points of source and target come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
     /// Both from the same points of the shape, as in DCP.
@@ -31,7 +32,7 @@ pub enum Sampling {
 
 /// Whether corrupted clouds are scaled to a box of side 2, as ModelNet40-C does after uniform,
 /// impulse, upsampling, background, shear and the three distortions (and only after those).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Normalize {
     /// Never. The pose stays exact and the scale stays 1.
@@ -46,12 +47,13 @@ pub enum Normalize {
 }
 
 /// From which rotations the pose is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum RotationRange {
     /// `R = Rx(a) Ry(b) Rz(c)` with each angle uniform in `[0, max_deg)`, as in DCP.
     EulerAxes {
         /// Upper end of each angle, in degrees.
+        #[schemars(range(min = 0.0, max = 360.0))]
         max_deg: f64,
     },
     /// Uniform over all rotations.
@@ -60,7 +62,7 @@ pub enum RotationRange {
 
 /// How pairs are made. The default is the protocol of our tables: DCP's poses and sampling, both
 /// clouds corrupted independently, no normalisation.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PairConfig {
     /// Which cloud is corrupted. Default: both.
@@ -73,9 +75,11 @@ pub struct PairConfig {
     pub rotation: RotationRange,
     /// Each coordinate of the translation is uniform in plus and minus this, canonical unit.
     /// Default: 0.5 (DCP).
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub translation: f64,
     /// Points of source and target; corrupted clouds are resampled to so many. Default: 1024
     /// (DCP).
+    #[schemars(range(min = 3, max = 1000000))]
     pub points: usize,
     /// Whether pairs say which base point each point is (needed by the oracle). Default: true.
     pub keep_correspondence: bool,

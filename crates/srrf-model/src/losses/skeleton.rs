@@ -2,6 +2,7 @@
 //! distribution distance loss `L_ddl`.
 
 use burn::tensor::{Tensor, TensorData};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::defaults;
@@ -10,22 +11,27 @@ use crate::procrustes::transform;
 use crate::sem::Skeleton;
 
 /// Weights of the skeleton losses.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SkeletonLossConfig {
     /// `lambda_1`, the weight of the point-to-sphere loss. Point2Skeleton: 0.3.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub point_to_sphere: f64,
     /// `lambda_2`, the weight of the radius loss. Point2Skeleton: 0.4.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub radius: f64,
     /// The weight of the distribution distance loss (mean over points; the paper prints a sum). At
     /// 1 the skeleton collapses to its centroid, at 0.25 it keeps its spread.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub distribution: f64,
     /// The weight of the distribution distance over the spread of the target skeleton, which shrinking does not
     /// lower, so that it may be as large as the distance is to count. Not in the paper; 0 is the paper.
     #[serde(default, skip_serializing_if = "defaults::is_zero")]
+    #[schemars(range(min = 0.0, max = 1e6), extend("default" = 0.0))]
     pub distribution_over_spread: f64,
     /// The weight of the distance between skeleton points of the same number in both clouds, over
     /// their spread. Not in the paper; 0 is the paper.
+    #[schemars(range(min = 0.0, max = 1e6))]
     pub index_match: f64,
 }
 
