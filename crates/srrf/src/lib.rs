@@ -22,6 +22,7 @@
 //! Coordinates go in and come out in `f64`, in the unit and the frame of the input. Inside, both clouds
 //! are centred, so that map coordinates keep their last millimetre.
 
+mod benchmark;
 mod frame;
 mod network;
 mod options;

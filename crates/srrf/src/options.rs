@@ -90,8 +90,8 @@ impl FromStr for RotationRange {
     }
 }
 
-/// What a user may want to change.
-#[derive(Debug, Clone, PartialEq)]
+/// What a user may want to change. [`fmt::Display`] writes all of it on one line, for records of what an answer was made with.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Options {
     /// How starts are found. Default [`Method::Auto`].
     pub method: Method,
@@ -130,9 +130,31 @@ impl Default for Options {
     }
 }
 
+/// One line of JSON that names every option; equal options give equal lines.
+impl fmt::Display for Options {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&serde_json::to_string(self).map_err(|_| fmt::Error)?)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_option_is_in_the_line() {
+        let options = Options::default();
+        let line = options.to_string();
+        assert_eq!(line, Options::default().to_string());
+        let others = [
+            Options { rotation: RotationRange::Within45, ..options.clone() },
+            Options { given: Some(Rigid::identity()), ..options.clone() },
+            Options { refine: None, ..options.clone() },
+            Options { abstain_below: 0.6, ..options.clone() },
+        ];
+        assert!(others.iter().all(|other| other.to_string() != line), "{line}");
+        assert!(line.contains("\"rotation\":\"180\"") && line.contains("\"soft_points\":4096"), "{line}");
+    }
 
     #[test]
     fn names_come_back() {
