@@ -1,9 +1,10 @@
 //! Matches between two clouds by their descriptors.
 
 use rayon::prelude::*;
-use srrf_cloud::{CloudError, PointCloud, RegisterError, Solid, point_spacing, voxel_downsample};
+use srrf_cloud::{RegisterError, VoxelError, coarsen};
 
-use crate::fpfh::{Descriptor, fpfh};
+use crate::fpfh::Descriptor;
+use crate::fpfh_cloud::FpfhCloud;
 
 /// Two thinned clouds and the matches between them.
 pub(crate) struct Correspondences {
@@ -23,31 +24,22 @@ pub(crate) struct Correspondences {
 /// `most_points`; the radius of the features is `feature_voxels` of it. A pair of points is a match if each is the other's nearest
 /// descriptor; where fewer than `least` are, every source point keeps its nearest.
 pub(crate) fn correspond(
-    source: Solid<'_>,
-    target: Solid<'_>,
+    source: &FpfhCloud<'_>,
+    target: &FpfhCloud<'_>,
     most_points: usize,
     feature_voxels: f64,
     least: usize,
 ) -> Result<Correspondences, RegisterError> {
-    let spacing = |cloud: Solid<'_>| point_spacing(cloud.points());
-    let mut voxel =
-        spacing(source).map_err(RegisterError::Source)?.max(spacing(target).map_err(RegisterError::Target)?);
-    let thin = |cloud: Solid<'_>, voxel: f64| {
-        voxel_downsample(&cloud, voxel)
-            .map(PointCloud::into_points)
-            .map_err(|e| RegisterError::NoPose(e.to_string()))
-    };
-    let (source, target) = loop {
-        let both = (thin(source, voxel)?, thin(target, voxel)?);
-        if both.0.len().max(both.1.len()) <= most_points.max(16) {
-            break both;
-        }
-        voxel *= 1.15;
-    };
-    let describe = |points: &[[f64; 3]], wrap: fn(CloudError) -> RegisterError| {
-        fpfh(points, feature_voxels * voxel).map_err(wrap)
-    };
-    let (a, b) = (describe(&source, RegisterError::Source)?, describe(&target, RegisterError::Target)?);
+    let most = most_points.max(16);
+    let (voxel, (source, target)) =
+        coarsen(source.spacing().max(target.spacing()), 1.15, |voxel| -> Result<_, VoxelError> {
+            let (source, target) = (source.thinned(voxel, most)?, target.thinned(voxel, most)?);
+            Ok(source.zip(target))
+        })
+        .map_err(|e| RegisterError::NoPose(e.to_string()))?;
+    let radius = feature_voxels * voxel;
+    let a = source.described(radius).map_err(RegisterError::Source)?;
+    let b = target.described(radius).map_err(RegisterError::Target)?;
     let forth = nearest_descriptors(&a, &b);
     let back = nearest_descriptors(&b, &a);
     let all = || forth.iter().enumerate().map(|(i, &j)| (i as u32, j));
@@ -55,7 +47,7 @@ pub(crate) fn correspond(
     if pairs.len() < least {
         pairs = all().collect();
     }
-    Ok(Correspondences { source, target, voxel, pairs })
+    Ok(Correspondences { source: source.points.clone(), target: target.points.clone(), voxel, pairs })
 }
 
 /// For each of `a` the nearest of `b`, the lowest index of equals. By looking at all: in 33 dimensions

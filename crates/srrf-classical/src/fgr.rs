@@ -3,10 +3,11 @@
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
-use srrf_cloud::{Register, RegisterError, Registration, Rigid, Solid};
+use srrf_cloud::{PairFrame, Register, RegisterError, Registration, Rigid, Solid};
 use srrf_refine::{Deformed, Match, NormalEquations, RefineConfig, RefineTarget};
 
 use crate::correspond::{Correspondences, correspond};
+use crate::fpfh_cloud::FpfhCloud;
 
 /// Settings of [`Fgr`]. Defaults are Open3D's where not said otherwise; lengths are in voxels, which
 /// follow from the clouds.
@@ -71,7 +72,8 @@ impl Register for Fgr {
 
     fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
         let config = &self.config;
-        let matches = correspond(source, target, config.points, config.feature_voxels, 30)?;
+        let (source_ready, target_ready) = FpfhCloud::pair(source, target)?;
+        let matches = correspond(&source_ready, &target_ready, config.points, config.feature_voxels, 30)?;
         let pairs = tuple_test(&matches, config);
         if pairs.len() < 3 {
             return Err(RegisterError::NoPose(format!(
@@ -138,12 +140,13 @@ fn optimise(pairs: &[PointPair], end: f64, config: &FgrConfig) -> Rigid {
     let least = end * end;
     let mut mu = (size * size).max(least);
     // Between centred points, so that far clouds lose no digits.
+    let frame = PairFrame::about(x0, y0);
     let mut pose = Rigid::identity();
     for iteration in 0..config.iterations {
         let mut sums = NormalEquations::default();
         for (x, y) in pairs {
-            let moved = pose.rotation * (nalgebra::Vector3::from(*x) - x0) + pose.translation;
-            let fixed = nalgebra::Vector3::from(*y) - y0;
+            let moved = nalgebra::Vector3::from(pose.apply(&frame.source(x)));
+            let fixed = nalgebra::Vector3::from(frame.target(y));
             let weight = (mu / (mu + (moved - fixed).norm_squared())).powi(2);
             sums.add(&Match { moved, fixed, normal: nalgebra::Vector3::zeros() }, weight, 0.0);
         }
@@ -153,7 +156,7 @@ fn optimise(pairs: &[PointPair], end: f64, config: &FgrConfig) -> Rigid {
             mu = (mu / config.division_factor).max(least);
         }
     }
-    Rigid { rotation: pose.rotation, translation: pose.translation + y0 - pose.rotation * x0 }
+    frame.undo_pose(&pose)
 }
 
 fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {

@@ -26,32 +26,53 @@ pub type Descriptor = [f32; WIDTH];
 /// inverse squared distance, as in Open3D, plus its own. Normals point away from the mean of the cloud, so that the
 /// descriptors do not change with the pose.
 pub fn fpfh(points: &[[f64; 3]], radius: f64) -> Result<Vec<Descriptor>, CloudError> {
-    let normals: Vec<Vector3<f64>> =
-        estimate_normals(points, NORMAL_NEIGHBOURS)?.into_iter().map(Vector3::from).collect();
-    let index = KnnIndex::new(points)?;
-    let neighbours: Vec<Vec<(usize, f64)>> =
-        points.par_iter().map(|p| index.within(p, radius, MOST_NEIGHBOURS)).collect();
-    let simple: Vec<[f64; 3 * BINS]> =
-        (0..points.len()).into_par_iter().map(|i| simplified(i, points, &normals, &neighbours[i])).collect();
-    Ok((0..points.len())
-        .into_par_iter()
-        .map(|i| {
-            let mut weighted = [0.0; 3 * BINS];
-            for &(j, squared) in neighbours[i].iter().filter(|n| n.1 > 0.0) {
-                weighted.iter_mut().zip(&simple[j]).for_each(|(sum, h)| *sum += h / squared);
-            }
-            let mut descriptor = [0.0; WIDTH];
-            for block in 0..3 {
-                let range = block * BINS..(block + 1) * BINS;
-                let total: f64 = weighted[range.clone()].iter().sum();
-                for bin in range {
-                    let mean = if total > 0.0 { 100.0 * weighted[bin] / total } else { 0.0 };
-                    descriptor[bin] = (mean + simple[i][bin]) as f32;
-                }
-            }
-            descriptor
-        })
-        .collect())
+    Ok(Oriented::new(points)?.describe(radius))
+}
+
+/// Indexed points with normals: what descriptors of every radius begin with.
+#[derive(Debug)]
+pub(crate) struct Oriented {
+    index: KnnIndex,
+    normals: Vec<Vector3<f64>>,
+}
+
+impl Oriented {
+    /// # Errors
+    /// [`CloudError::TooFew`] under 3 points, [`CloudError::NotFinite`] at the first NaN or infinity.
+    pub fn new(points: &[[f64; 3]]) -> Result<Self, CloudError> {
+        let normals = estimate_normals(points, NORMAL_NEIGHBOURS)?.into_iter().map(Vector3::from).collect();
+        Ok(Self { index: KnnIndex::new(points)?, normals })
+    }
+
+    /// As [`fpfh`].
+    pub fn describe(&self, radius: f64) -> Vec<Descriptor> {
+        let (points, normals) = (self.index.points(), &self.normals);
+        let neighbours: Vec<Vec<(usize, f64)>> =
+            points.par_iter().map(|p| self.index.within(p, radius, MOST_NEIGHBOURS)).collect();
+        let simple: Vec<[f64; 3 * BINS]> = (0..points.len())
+            .into_par_iter()
+            .map(|i| simplified(i, points, normals, &neighbours[i]))
+            .collect();
+        (0..points.len()).into_par_iter().map(|i| descriptor(&simple, i, &neighbours[i])).collect()
+    }
+}
+
+/// The mean of the neighbours' histograms by inverse squared distance, plus the point's own.
+fn descriptor(simple: &[[f64; 3 * BINS]], i: usize, neighbours: &[(usize, f64)]) -> Descriptor {
+    let mut weighted = [0.0; 3 * BINS];
+    for &(j, squared) in neighbours.iter().filter(|n| n.1 > 0.0) {
+        weighted.iter_mut().zip(&simple[j]).for_each(|(sum, h)| *sum += h / squared);
+    }
+    let mut descriptor = [0.0; WIDTH];
+    for block in 0..3 {
+        let range = block * BINS..(block + 1) * BINS;
+        let total: f64 = weighted[range.clone()].iter().sum();
+        for bin in range {
+            let mean = if total > 0.0 { 100.0 * weighted[bin] / total } else { 0.0 };
+            descriptor[bin] = (mean + simple[i][bin]) as f32;
+        }
+    }
+    descriptor
 }
 
 /// Counts of the angles between a point and each neighbour, each block summing to 100.

@@ -5,6 +5,7 @@ use srrf_cloud::{Register, RegisterError, Registration, Rigid, Solid};
 use srrf_refine::{Deformed, RefineConfig, RefineTarget};
 
 use crate::correspond::correspond;
+use crate::fpfh_cloud::FpfhCloud;
 use crate::ransac::{Search, ransac};
 
 /// Settings of [`FpfhRansac`]. Lengths are in voxels, and the voxel follows from the clouds.
@@ -67,8 +68,12 @@ impl FpfhRansac {
     /// [`FpfhRansacConfig::hypotheses`].
     ///
     /// # Errors
-    /// [`RegisterError`] for clouds that cannot be used, and where no sample was consistent.
-    pub fn hypotheses(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Hypotheses, RegisterError> {
+    /// [`RegisterError`] where fewer than three voxels hold points, and where no sample was consistent.
+    pub fn hypotheses(
+        &self,
+        source: &FpfhCloud<'_>,
+        target: &FpfhCloud<'_>,
+    ) -> Result<Hypotheses, RegisterError> {
         let config = &self.config;
         let matches = correspond(source, target, config.points, config.feature_voxels, 30)?;
         let search = Search {
@@ -106,7 +111,8 @@ impl Register for FpfhRansac {
     }
 
     fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
-        let found = self.hypotheses(source, target)?;
+        let (source_ready, target_ready) = FpfhCloud::pair(source, target)?;
+        let found = self.hypotheses(&source_ready, &target_ready)?;
         let Some(config) = &self.config.refine else {
             return Ok(Registration { iterations: found.drawn, ..Registration::from_pose(found.poses[0]) });
         };

@@ -1,15 +1,18 @@
 //! The loop that the variants of ICP share: match, weigh, step.
 
 use nalgebra::Vector3;
-use srrf_cloud::{KnnIndex, RegisterError, Registration, Rigid, Solid, estimate_normals, spacing_of};
+use srrf_cloud::{
+    KnnIndex, PairFrame, RegisterError, Registration, Rigid, Solid, estimate_normals, spacing_of,
+};
 use srrf_refine::{Match, NormalEquations};
 
-/// A target made ready, and the source in the frame of its mean.
+/// A target made ready, and a source.
 pub(crate) struct Scene {
     source: Vec<Vector3<f64>>,
     index: KnnIndex,
     normals: Option<Vec<Vector3<f64>>>,
-    target_mean: Vector3<f64>,
+    /// The target is about its mean; the source is where it was given.
+    frame: PairFrame,
     /// Median distance between neighbouring target points.
     pub spacing: f64,
     /// Root mean square distance of the target from its mean.
@@ -23,9 +26,8 @@ impl Scene {
         target: Solid<'_>,
         neighbours: Option<usize>,
     ) -> Result<Self, RegisterError> {
-        let target_mean = target.centroid();
-        let centred: Vec<[f64; 3]> =
-            target.points().iter().map(|p| (Vector3::from(*p) - target_mean).into()).collect();
+        let frame = PairFrame::about(Vector3::zeros(), target.centroid());
+        let centred: Vec<[f64; 3]> = target.points().iter().map(|p| frame.target(p)).collect();
         let index = KnnIndex::new(&centred).map_err(RegisterError::Target)?;
         let normals = match neighbours {
             Some(k) => Some(estimate_normals(&centred, k).map_err(RegisterError::Target)?),
@@ -38,7 +40,7 @@ impl Scene {
             radius: (squares / centred.len() as f64).sqrt(),
             normals: normals.map(|n| n.into_iter().map(Vector3::from).collect()),
             index,
-            target_mean,
+            frame,
         })
     }
 
@@ -51,7 +53,7 @@ impl Scene {
         weigh: impl Fn(&[f64], usize) -> Vec<f64>,
     ) -> Result<Registration, RegisterError> {
         let metric = if self.normals.is_some() { (0.01, 1.0) } else { (1.0, 0.0) };
-        let mut pose = Rigid { rotation: Rigid::identity().rotation, translation: -self.target_mean };
+        let mut pose = self.frame.pose(&Rigid::identity());
         let (mut converged, mut iterations) = (false, 0);
         while iterations < max_iterations && !converged {
             let matches: Vec<Match> =
@@ -77,8 +79,7 @@ impl Scene {
             converged = (change / self.source.len() as f64).sqrt() <= tolerance * self.radius;
             pose = next;
         }
-        pose.translation += self.target_mean;
-        Ok(Registration { converged, iterations, ..Registration::from_pose(pose) })
+        Ok(Registration { converged, iterations, ..Registration::from_pose(self.frame.undo_pose(&pose)) })
     }
 
     fn nearest(&self, moved: &Vector3<f64>) -> Match {

@@ -11,6 +11,7 @@
 mod correspond;
 mod fgr;
 pub mod fpfh;
+mod fpfh_cloud;
 mod fpfh_ransac;
 mod icp;
 mod icp_loop;
@@ -18,10 +19,12 @@ mod icp_plane;
 mod icp_robust;
 mod icp_trimmed;
 mod identity;
+mod memo;
 mod ransac;
 
 pub use correspond::nearest_descriptors;
 pub use fgr::{Fgr, FgrConfig};
+pub use fpfh_cloud::FpfhCloud;
 pub use fpfh_ransac::{FpfhRansac, FpfhRansacConfig, Hypotheses};
 pub use icp::{Icp, IcpConfig};
 pub use icp_plane::{IcpPlane, IcpPlaneConfig};

@@ -73,6 +73,18 @@ impl PointCloud {
         self.points.iter().map(|p| Vector3::from(*p)).sum::<Vector3<f64>>() / self.len() as f64
     }
 
+    /// Middle of the bounding box: unlike a mean over millions of large coordinates, it is exact to the last digit.
+    pub fn middle(&self) -> Vector3<f64> {
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for p in &self.points {
+            for c in 0..3 {
+                low[c] = low[c].min(p[c]);
+                high[c] = high[c].max(p[c]);
+            }
+        }
+        std::array::from_fn::<f64, 3, _>(|c| low[c] / 2.0 + high[c] / 2.0).into()
+    }
+
     /// The cloud moved by `pose`: each point `p` becomes `R p + t`.
     pub fn transformed(&self, pose: &Rigid) -> Self {
         Self { points: self.points.iter().map(|p| pose.apply(p)).collect() }

@@ -101,10 +101,11 @@ mod tests {
     use crate::EulerXyz;
 
     fn motion(translation: [f64; 3]) -> Rigid {
-        Rigid {
-            rotation: EulerXyz::from_deg([1.0, 2.0, 30.0]).to_matrix(),
-            translation: translation.into(),
-        }
+        Rigid { rotation: EulerXyz::from_deg([1.0, 2.0, 30.0]).to_matrix(), translation: translation.into() }
+    }
+
+    fn gap(a: [f64; 3], b: [f64; 3]) -> f64 {
+        (Vector3::from(a) - Vector3::from(b)).norm()
     }
 
     fn cloud() -> PointCloud {
@@ -121,14 +122,14 @@ mod tests {
             PairFrame::about_far(source.middle(), target.middle()),
             PairFrame::with_radius(&source, &target, 0.6),
         ];
-        for (frame, unit) in frames.iter().zip([1e-8, 1e-8, 1e-8]) {
+        for frame in frames {
             let local = frame.pose(&truth);
             for (p, q) in source.points().iter().zip(target.points()) {
                 let (a, b) = (frame.source(p), frame.target(q));
                 assert!(a.iter().all(|v| v.abs() < 4.0));
-                assert!((Vector3::from(local.apply(&a)) - Vector3::from(b)).norm() < unit);
-                assert!((Vector3::from(frame.undo_source(&a)) - Vector3::from(*p)).norm() < 1e-8);
-                assert!((Vector3::from(frame.undo_target(&b)) - Vector3::from(*q)).norm() < 1e-8);
+                assert!(gap(local.apply(&a), b) < 1e-8);
+                assert!(gap(frame.undo_source(&a), *p) < 1e-8);
+                assert!(gap(frame.undo_target(&b), *q) < 1e-8);
             }
             assert!((frame.undo_pose(&local).to_matrix4() - truth.to_matrix4()).norm() < 1e-8);
         }
@@ -142,9 +143,8 @@ mod tests {
         let a = squares(source.points().iter().map(|p| frame.source(p)).collect());
         let b = squares(target.points().iter().map(|p| frame.target(p)).collect());
         assert!((((a + b) / 6.0).sqrt() - 0.6).abs() < 1e-12);
-        let length = Vector3::from(source.points()[0]).metric_distance(&source.points()[1].into());
-        let local = Vector3::from(frame.source(&source.points()[0]))
-            .metric_distance(&frame.source(&source.points()[1]).into());
+        let (p, q) = (source.points()[0], source.points()[1]);
+        let (length, local) = (gap(p, q), gap(frame.source(&p), frame.source(&q)));
         assert!((frame.undo_length(local) - length).abs() < 1e-9);
     }
 

@@ -5,9 +5,11 @@
 //! names: `target_from_source` maps source coordinates into the target frame,
 //! `target ~ R source + t`.
 
+mod centred;
 mod cloud;
 mod euler;
 mod fps;
+mod frame;
 pub mod io;
 mod neighbours;
 mod normals;
@@ -18,9 +20,11 @@ mod solid;
 mod triangles;
 mod voxel;
 
+pub use centred::CentredCloud;
 pub use cloud::{CloudError, PointCloud, UnitSphere};
 pub use euler::EulerXyz;
 pub use fps::farthest_point_sampling;
+pub use frame::PairFrame;
 pub use neighbours::KnnIndex;
 pub use normals::estimate_normals;
 pub use register::{
@@ -29,4 +33,4 @@ pub use register::{
 pub use rigid::Rigid;
 pub use solid::Solid;
 pub use triangles::Triangles;
-pub use voxel::{VoxelError, point_spacing, spacing_of, voxel_downsample};
+pub use voxel::{VoxelError, coarsen, point_spacing, spacing_of, thin_to, voxel_downsample};

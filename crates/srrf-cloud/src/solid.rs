@@ -34,6 +34,11 @@ impl<'a> Solid<'a> {
         if line { Err(CloudError::Collinear) } else { Ok(Self(cloud)) }
     }
 
+    /// A cloud of which the caller knows that it was checked.
+    pub(crate) fn promised(cloud: &'a PointCloud) -> Self {
+        Self(cloud)
+    }
+
     /// The cloud, for as long as it was borrowed.
     pub fn cloud(self) -> &'a PointCloud {
         self.0

@@ -67,6 +67,42 @@ pub fn voxel_downsample(cloud: &PointCloud, size: f64) -> Result<PointCloud, Vox
     PointCloud::new(centroids).map_err(|_| VoxelError::TooFine { size, extent })
 }
 
+/// The cloud itself if it has at most `most` points, or the centroids of the smallest voxels that leave no more; sizes grow
+/// in steps of a quarter from the one at which a surface of this `radius` would have that many voxels.
+///
+/// Where lengths cannot be computed from the coordinates (beyond 1e150, say), it is the cloud itself.
+pub fn thin_to(cloud: &PointCloud, most: usize, radius: f64) -> PointCloud {
+    if cloud.len() <= most {
+        return cloud.clone();
+    }
+    // A surface of this radius has about 4 pi (radius / size)^2 voxels.
+    let first = radius * (4.0 / most as f64).sqrt();
+    let thin = |size| match voxel_downsample(cloud, size) {
+        Ok(thin) => Ok((thin.len() <= most).then_some(thin)),
+        Err(VoxelError::TooFine { .. }) => Ok(None),
+        Err(no_length) => Err(no_length),
+    };
+    coarsen(first, 1.25, thin).map_or_else(|_| cloud.clone(), |(_, thin)| thin)
+}
+
+/// The first of the sizes `first`, `first * growth`, ... for which `thin` has an answer, and the answer.
+///
+/// # Errors
+/// The first error of `thin`. It must have an answer for large sizes: one huge voxel holds every cloud.
+pub fn coarsen<T, E>(
+    first: f64,
+    growth: f64,
+    mut thin: impl FnMut(f64) -> Result<Option<T>, E>,
+) -> Result<(f64, T), E> {
+    let mut size = first;
+    loop {
+        if let Some(thinned) = thin(size)? {
+            return Ok((size, thinned));
+        }
+        size *= growth;
+    }
+}
+
 /// Median distance from a point to the nearest point that does not coincide with it, unit of the
 /// points; 0 where all points coincide.
 ///
@@ -126,6 +162,19 @@ mod tests {
         assert_eq!(voxel_downsample(&cloud, 50.0).unwrap().len(), 1);
         let whole = voxel_downsample(&cloud, 50.0).unwrap().points()[0];
         assert!((Vector3::from(whole) - cloud.centroid()).norm() < 1e-12);
+    }
+
+    #[test]
+    fn thins_to_a_number_of_points_and_no_more() {
+        let cloud = cloud(2003);
+        assert_eq!(thin_to(&cloud, 2003, 1.0), cloud);
+        let thin = thin_to(&cloud, 500, 1.0);
+        assert!((200..=500).contains(&thin.len()), "{}", thin.len());
+        assert_eq!(thin_to(&cloud, 1, 1.0).len(), 1);
+        // Beyond what lengths can be computed from, and no loop without end.
+        for radius in [0.0, f64::INFINITY, f64::NAN] {
+            assert_eq!(thin_to(&cloud, 500, radius), cloud);
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 use nalgebra::{Matrix3, Vector3};
-use srrf_cloud::{PointCloud, Rigid};
+use srrf_cloud::{PairFrame, PointCloud, Rigid};
 
 use crate::ops::HostClouds;
 
@@ -10,65 +10,9 @@ use crate::ops::HostClouds;
 /// sphere have about this one, so thresholds in network units read as shares of the radius.
 const NETWORK_RMS: f64 = 0.6;
 
-/// Where a pair's clouds lie in network units: each centred on its own mean, both divided by one
-/// scale, so that the rotation stays what it is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PairFrame {
-    source_mean: Vector3<f64>,
-    target_mean: Vector3<f64>,
-    scale: f64,
-}
-
-impl PairFrame {
-    /// The frame of a pair.
-    pub fn new(source: &PointCloud, target: &PointCloud) -> Self {
-        let (source_mean, target_mean) = (source.centroid(), target.centroid());
-        let mean_square = |cloud: &PointCloud, mean: Vector3<f64>| {
-            cloud.points().iter().map(|p| (Vector3::from(*p) - mean).norm_squared()).sum::<f64>()
-                / cloud.len() as f64
-        };
-        let rms = ((mean_square(source, source_mean) + mean_square(target, target_mean)) / 2.0).sqrt();
-        let scale = if rms > 0.0 { rms / NETWORK_RMS } else { 1.0 };
-        Self { source_mean, target_mean, scale }
-    }
-
-    /// Source coordinates in network units.
-    pub fn source(&self, point: &[f64; 3]) -> [f64; 3] {
-        ((Vector3::from(*point) - self.source_mean) / self.scale).into()
-    }
-
-    /// Target coordinates in network units.
-    pub fn target(&self, point: &[f64; 3]) -> [f64; 3] {
-        ((Vector3::from(*point) - self.target_mean) / self.scale).into()
-    }
-
-    /// A point of the source in network units, back in source coordinates.
-    pub fn undo_source(&self, point: &[f64; 3]) -> [f64; 3] {
-        (Vector3::from(*point) * self.scale + self.source_mean).into()
-    }
-
-    /// A point of the target in network units, back in target coordinates.
-    pub fn undo_target(&self, point: &[f64; 3]) -> [f64; 3] {
-        (Vector3::from(*point) * self.scale + self.target_mean).into()
-    }
-
-    /// A length in network units, in the unit of the clouds.
-    pub fn undo_length(&self, length: f64) -> f64 {
-        length * self.scale
-    }
-
-    /// A pose between the given clouds as the network sees it.
-    pub fn to_network(&self, target_from_source: &Rigid) -> Rigid {
-        let Rigid { rotation, translation } = target_from_source;
-        let translation = (translation + rotation * self.source_mean - self.target_mean) / self.scale;
-        Rigid { rotation: *rotation, translation }
-    }
-
-    /// A pose that the network found, between the given clouds.
-    pub fn from_network(&self, pose: &Rigid) -> Rigid {
-        let translation = self.scale * pose.translation + self.target_mean - pose.rotation * self.source_mean;
-        Rigid { rotation: pose.rotation, translation }
-    }
+/// The frame in which the network sees a pair: each cloud centred on its own mean, both divided by one scale.
+pub fn network_frame(source: &PointCloud, target: &PointCloud) -> PairFrame {
+    PairFrame::with_radius(source, target, NETWORK_RMS)
 }
 
 /// A batch of pairs in network units, not yet on a device; every cloud has the same number of points.
@@ -89,7 +33,7 @@ impl HostPairs {
             return None;
         }
         let frames: Vec<PairFrame> =
-            pairs.iter().map(|(source, target)| PairFrame::new(source, target)).collect();
+            pairs.iter().map(|(source, target)| network_frame(source, target)).collect();
         let mut clouds = Vec::with_capacity(2 * pairs.len() * points);
         for ((x, _), frame) in pairs.iter().zip(&frames) {
             clouds.extend(x.points().iter().map(|p| frame.source(p).map(|v| v as f32)));
@@ -132,7 +76,7 @@ impl PairBatch {
         let device = self.source.device();
         let (mut rotations, mut translations) = (Vec::new(), Vec::new());
         for (frame, pose) in self.frames.iter().zip(target_from_source) {
-            let pose = frame.to_network(pose);
+            let pose = frame.pose(pose);
             rotations.extend(pose.rotation.transpose().iter().map(|&v| v as f32)); // row-major
             translations.extend(pose.translation.iter().map(|&v| v as f32));
         }
@@ -157,7 +101,7 @@ impl PairBatch {
             .map(|(frame, (r, t))| {
                 let rotation = Rigid::nearest_rotation(&Matrix3::from_row_slice(r))?;
                 let translation = Vector3::from_column_slice(t);
-                let pose = frame.from_network(&Rigid { rotation, translation });
+                let pose = frame.undo_pose(&Rigid { rotation, translation });
                 // Clouds whose coordinates overflow have no scale either.
                 pose.translation.iter().all(|v| v.is_finite()).then_some(pose)
             })

@@ -34,7 +34,7 @@ mod srrf;
 mod timing;
 pub mod weights;
 
-pub use batch::{HostPairs, PairBatch, PairFrame};
+pub use batch::{HostPairs, PairBatch, network_frame};
 pub use branch::{Branch, BranchConfig, BranchLayout, BranchOutput};
 pub use device::{
     DeviceError, NAMES as DEVICE_NAMES, built_in as built_in_devices, device, devices, is_accelerator,

@@ -2,7 +2,8 @@
 
 use burn::tensor::{Tensor, TensorData};
 
-use crate::batch::PairFrame;
+use srrf_cloud::PairFrame;
+
 use crate::ops::squared_distances;
 
 /// A Gaussian about each source point, as the pose of the pass before placed it, for where its match lies. Not in the

@@ -3,10 +3,11 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use srrf_cloud::{
-    Branch, PointCloud, Register, RegisterError, Registration, Rigid, Skeleton, Skeletons, SoftMatch, Solid,
+    Branch, PairFrame, PointCloud, Register, RegisterError, Registration, Rigid, Skeleton, Skeletons,
+    SoftMatch, Solid,
 };
 
-use crate::batch::{PairBatch, PairFrame};
+use crate::batch::PairBatch;
 use crate::branch::BranchOutput;
 use crate::inference::InferenceConfig;
 use crate::integration::IntegrationConfig;

@@ -5,8 +5,8 @@ mod common;
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{DType, Device, Tensor};
 use common::{Numbers, difference, tensor, tensor64, values};
-use srrf_cloud::PointCloud;
-use srrf_model::{Matches, MatchingConfig, PairFrame, PositionPrior, SoftMatching, init, sinkhorn};
+use srrf_cloud::{PairFrame, PointCloud};
+use srrf_model::{Matches, MatchingConfig, PositionPrior, SoftMatching, init, network_frame, sinkhorn};
 
 const CLOUDS: usize = 3;
 const SOURCES: usize = 5;
@@ -197,7 +197,7 @@ fn the_position_prior_is_about_placed_points_not_centred_ones() {
         .zip(&targets)
         .map(|(x, y)| (PointCloud::new(x.clone()).unwrap(), PointCloud::new(y.clone()).unwrap()))
         .collect();
-    let frames: Vec<PairFrame> = pairs.iter().map(|(x, y)| PairFrame::new(x, y)).collect();
+    let frames: Vec<PairFrame> = pairs.iter().map(|(x, y)| network_frame(x, y)).collect();
     let network = |clouds: &[Vec<[f64; 3]>; 2], to: fn(&PairFrame, &[f64; 3]) -> [f64; 3]| -> Tensor<3> {
         let points = clouds.iter().zip(&frames).flat_map(|(c, frame)| c.iter().map(move |p| to(frame, p)));
         let points: Vec<f64> = points.flatten().collect();

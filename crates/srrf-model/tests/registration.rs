@@ -11,7 +11,7 @@ use common::{Numbers, difference, tiny, values};
 use nalgebra::Vector3;
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, SoftMatch};
 use srrf_model::{
-    BranchKind, InferenceConfig, Matches, PairBatch, PairFrame, SrrfConfig, SrrfRegister, init, weights,
+    BranchKind, InferenceConfig, Matches, PairBatch, SrrfConfig, SrrfRegister, init, network_frame, weights,
 };
 
 /// Far from the origin, as map coordinates in metres are.
@@ -45,7 +45,7 @@ fn frames_centre_scale_and_are_undone() {
         let source = placed(&cloud(1, 61), factor, offset);
         let pose = drawn(2);
         let target = source.transformed(&pose);
-        let frame = PairFrame::new(&source, &target);
+        let frame = network_frame(&source, &target);
 
         let mut sums = [Vector3::zeros(); 2];
         let mut squares = 0.0;
@@ -58,13 +58,13 @@ fn frames_centre_scale_and_are_undone() {
         assert!((squares.sqrt() - 0.6).abs() < 1e-6);
 
         // The frames commute with the pose, and the conversion is undone.
-        let inside = frame.to_network(&pose);
+        let inside = frame.pose(&pose);
         for p in source.points() {
             let one = Vector3::from(frame.target(&pose.apply(p)));
             let other = Vector3::from(inside.apply(&frame.source(p)));
             assert!((one - other).norm() < 1e-8 / factor.min(1.0));
         }
-        let back = frame.from_network(&inside);
+        let back = frame.undo_pose(&inside);
         assert!(image_gap(&source, &back, &pose) < 1e-6 * factor.max(1e-3));
     }
 }

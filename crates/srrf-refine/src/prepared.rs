@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use srrf_cloud::{
-    CloudError, KnnIndex, PointCloud, Rigid, Solid, estimate_normals, spacing_of, voxel_downsample,
+    CloudError, KnnIndex, PairFrame, PointCloud, Rigid, Solid, estimate_normals, spacing_of, thin_to,
 };
 
 use crate::RefineConfig;
@@ -52,7 +52,7 @@ impl Prepared {
         let squares: f64 = centred.iter().map(|p| Vector3::from(*p).norm_squared()).sum();
         let radius = (squares / centred.len() as f64).sqrt();
         let centred = PointCloud::new(centred)?;
-        let level = |most| Level::new(thinned(&centred, most, radius).points(), config.normal_neighbours);
+        let level = |most| Level::new(thin_to(&centred, most, radius).points(), config.normal_neighbours);
         let fine = level(config.max_points)?;
         let coarse = if fine.points().len() > config.coarse_points {
             Some(level(config.coarse_points)?)
@@ -60,6 +60,11 @@ impl Prepared {
             None
         };
         Ok(Self { centre, radius, coarse, fine })
+    }
+
+    /// The frame of this cloud as the source, and of `target`: both about their means.
+    pub fn frame_to(&self, target: &Self) -> PairFrame {
+        PairFrame::about(self.centre, target.centre)
     }
 
     /// A cloud of tests, with the default settings.
@@ -81,35 +86,12 @@ impl Prepared {
     }
 }
 
-/// The cloud itself if it has at most `most` points, or centroids of the smallest voxels, in steps
-/// of a quarter, that give no more.
-fn thinned(cloud: &PointCloud, most: usize, radius: f64) -> PointCloud {
-    if cloud.len() <= most {
-        return cloud.clone();
-    }
-    // A surface of this radius has about 4 pi (radius / size)^2 voxels.
-    let mut size = radius * (4.0 / most as f64).sqrt();
-    loop {
-        match voxel_downsample(cloud, size) {
-            Ok(thin) if thin.len() <= most => return thin,
-            // One huge voxel always suffices, so that the loop ends.
-            _ => size *= 1.25,
-        }
-    }
-}
-
 /// `pose` between the inputs as a pose between the centred clouds.
 pub(crate) fn to_local(pose: &Rigid, source: &Prepared, target: &Prepared) -> Rigid {
-    Rigid {
-        rotation: pose.rotation,
-        translation: pose.rotation * source.centre + pose.translation - target.centre,
-    }
+    source.frame_to(target).pose(pose)
 }
 
 /// The way back from [`to_local`].
 pub(crate) fn to_global(pose: &Rigid, source: &Prepared, target: &Prepared) -> Rigid {
-    Rigid {
-        rotation: pose.rotation,
-        translation: pose.translation + target.centre - pose.rotation * source.centre,
-    }
+    source.frame_to(target).undo_pose(pose)
 }

@@ -1,6 +1,6 @@
 //! The network as a source of starts.
 
-use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid, voxel_downsample};
+use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid, thin_to};
 use srrf_model::weights::LoadedModel;
 use srrf_model::{SrrfRegister, embedded};
 
@@ -74,16 +74,5 @@ pub fn open(from: Option<&str>, device: &str) -> Result<LoadedModel, String> {
 /// An even part of a large cloud: voxel centroids, [`THINNED`] or fewer. A cloud that is small already
 /// stays as it is.
 pub fn thinned(cloud: &PointCloud) -> PointCloud {
-    let mut thin = cloud.clone();
-    // A surface of radius r has about 4 pi (r / size)^2 voxels; the bounding sphere is larger than it.
-    let (_, frame) = cloud.to_unit_sphere();
-    let mut size = frame.radius * (4.0 / THINNED as f64).sqrt();
-    while thin.len() > THINNED {
-        match voxel_downsample(cloud, size) {
-            Ok(voxels) => thin = voxels,
-            Err(_) => return cloud.clone(), // the network's own subsample serves as well
-        }
-        size *= 1.25;
-    }
-    thin
+    thin_to(cloud, THINNED, cloud.to_unit_sphere().1.radius)
 }

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use nalgebra::Matrix3;
 use rayon::prelude::*;
-use srrf_classical::{FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
+use srrf_classical::{FpfhCloud, FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, Skeletons, Solid};
 use srrf_refine::{Ranking, RefineError, RefineTarget};
 
@@ -274,16 +274,17 @@ impl Registrar {
         radius: f64,
         given: &Rigid,
     ) -> Result<Vec<Start>, RegisterError> {
+        let (source, target) = FpfhCloud::pair(
+            source.solid().map_err(RegisterError::Source)?,
+            target.centred.solid().map_err(RegisterError::Target)?,
+        )?;
         let config = FpfhRansacConfig {
             seed: self.options.seed,
             feature_voxels: radius,
             hypotheses: WIDE,
             ..FpfhRansacConfig::default()
         };
-        let found = FpfhRansac::new(config).hypotheses(
-            source.solid().map_err(RegisterError::Source)?,
-            target.centred.solid().map_err(RegisterError::Target)?,
-        )?;
+        let found = FpfhRansac::new(config).hypotheses(&source, &target)?;
         let poses = match self.options.rotation {
             RotationRange::Any => found.poses,
             RotationRange::Within45 => within(found.poses, given)?,

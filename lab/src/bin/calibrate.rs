@@ -15,9 +15,10 @@ use rayon::prelude::*;
 use srrf::{Features, Logistic, Options, Registrar, RotationRange};
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::crop::{crop, random_direction, visible};
-use srrf_corrupt::datasets::{ShapeSource, Split, VALIDATION_SHAPES, held_out, open};
+use srrf_corrupt::datasets::{ShapeSource, Split, held_out, open};
 use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream};
+use srrf_lab::VALIDATION_SHAPES;
 
 const SEED: u64 = 77_001;
 

@@ -12,7 +12,7 @@ use clap::Parser;
 use srrf_cloud::{KnnIndex, Register, Rigid, SoftMatch};
 use srrf_corrupt::{CorruptionKind, Pair, Severity};
 use srrf_eval::{PairError, Scores};
-use srrf_model::{PairFrame, SrrfRegister, device, embedded, keep_freed_memory};
+use srrf_model::{SrrfRegister, device, embedded, keep_freed_memory, network_frame};
 use srrf_train::config::TrainConfig;
 use srrf_train::data::{TrainingPairs, training_shapes};
 use srrf_train::step::Workers;
@@ -65,7 +65,7 @@ fn judge(method: &SrrfRegister, pair: &Pair) -> Option<Judged> {
     let answer = method.register(&pair.source, &pair.target).ok()?;
     let branch = |b: usize| answer.branches.get(b).map(|branch| branch.target_from_source);
     let (dense, skeleton) = (branch(0)?, branch(1)?);
-    let scale = PairFrame::new(&pair.source, &pair.target).undo_length(1.0);
+    let scale = network_frame(&pair.source, &pair.target).undo_length(1.0);
     let (by_dense, by_skeleton) = (distances(pair, &dense)?, distances(pair, &skeleton)?);
     let residuals = |pose: &Rigid| -> Vec<f64> {
         let off =

@@ -17,9 +17,10 @@ use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use srrf_cloud::{EulerXyz, PointCloud, Register, Rigid, Solid};
 use srrf_corrupt::crop::{crop, random_direction, visible};
-use srrf_corrupt::datasets::{ShapeSource, Split, VALIDATION_SHAPES, held_out, open};
+use srrf_corrupt::datasets::{ShapeSource, Split, held_out, open};
 use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{CorruptionKind, Pair, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream};
+use srrf_lab::VALIDATION_SHAPES;
 use srrf_model::{SrrfRegister, device, embedded};
 use srrf_refine::{Metric, RefineConfig, RefineTarget, Verdict};
 

@@ -31,9 +31,6 @@ pub fn held_out(shapes: usize, count: usize) -> Vec<usize> {
     (0..count).map(|i| ((i as f64 + 0.5) * stride) as usize).collect()
 }
 
-/// Shapes that the network of the program, `srrf`, was validated with ([`held_out`]): `data.validation` of its configuration.
-pub const VALIDATION_SHAPES: usize = 192;
-
 /// A set of shapes from which registration pairs are made.
 #[allow(clippy::len_without_is_empty, reason = "a source is never empty")]
 pub trait ShapeSource: Send + Sync {
