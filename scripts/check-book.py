@@ -5,7 +5,8 @@
     python3 scripts/check-book.py --fill    # writes the numbers that are quoted by their key
 
 A sentence quotes a number as `<!-- n:KEY -->1.76<!-- / -->`. The key stands in one of book/src/generated/*.json, flat objects
-of strings, which the programs that make the tables write.
+of strings, which the programs that make the tables write. README's table is made of such numbers between `<!-- t:readme -->`
+and `<!-- / -->`; a cell without a number is a dot, and fails the check.
 """
 
 import json
@@ -16,6 +17,14 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BOOK = ROOT / "book" / "src"
 RECORD_LINES = 20  # of a record of an experiment, without the empty ones
+TABLE = re.compile(r"(<!-- t:readme -->\n)(.*?)(<!-- / -->)", re.S)
+ROWS = [  # of README's table: key and words
+    ("objects", "objects, clean"),
+    ("corrupted", "objects, 12 corruptions"),
+    ("partial", "objects with holes"),
+    ("scans", "real scans"),
+    ("meshes", "other meshes"),
+]
 QUOTE = re.compile(r"(<!-- n:([\w.+-]+) -->)(.*?)(<!-- / -->)", re.S)
 LINK = re.compile(r"!?\[[^\]]*\]\(([^()\s]+)\)")
 NO_COMMAND = re.compile(r"scripts? (?:that (?:is|are) )?(?:outside|not in) the repository|scratch program")
@@ -88,6 +97,15 @@ def numbers():
     return found, problems
 
 
+def readme_table(known):
+    head = "| pairs | right, % | of the answered right, % | s a pair | best peer | its right, % | its s |"
+    columns = ("right", "right_answered", "seconds", "peer", "peer_right", "peer_seconds")
+    lines = [head, "|---|---|---|---|---|---|---|"]
+    for row, words in ROWS:
+        lines.append(f"| {words} | " + " | ".join(known.get(f"readme.{row}.{c}", "·") for c in columns) + " |")
+    return "\n".join(lines) + "\n"
+
+
 def main():
     fill = sys.argv[1:] == ["--fill"]
     if sys.argv[1:] and not fill:
@@ -105,8 +123,17 @@ def main():
                 here.append(f"number {key}: no program has written it")
             elif not fill and known[key] != value:
                 here.append(f"number {key} is {known[key]}, and the sentence says {value}")
+        table = TABLE.search(text)
+        if table:
+            made = readme_table(known)
+            if "·" in made:
+                here.append("the table has cells without a number")
+            if not fill and made != table[2]:
+                here.append("the table is not the one that --fill makes")
         if fill:
-            filled = QUOTE.sub(lambda m: m[1] + known.get(m[2], m[3]) + m[4], text)
+            text = path.read_text()
+            filled = TABLE.sub(lambda m: m[1] + readme_table(known) + m[3], text)
+            filled = QUOTE.sub(lambda m: m[1] + known.get(m[2], m[3]) + m[4], filled)
             if filled != text:
                 path.write_text(filled)
         problems += [f"{path.relative_to(ROOT)}: {what}" for what in here]

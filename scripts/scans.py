@@ -2,7 +2,8 @@
 
     pip install open3d small-gicp numpy
     cargo build --release -p srrf
-    python3 scripts/scans.py SCANS --srrf target/release/srrf > table.md
+    python3 scripts/scans.py SCANS --srrf target/release/srrf                             # prints the page
+    python3 scripts/scans.py SCANS --srrf target/release/srrf --book book/src/generated   # writes scans.md and scans.json
 
 SCANS holds `bunny/` (the Stanford bunny's range scans and bun.conf) and `lidar/` (source.ply, target.ply and
 T_target_source.txt, 4 x 4). Every ordered pair is registered from the given frames and from random poses of the
@@ -19,9 +20,11 @@ local method, so it is not expected to solve random poses.
 """
 
 import argparse
+import datetime
 import json
 import os
 import pathlib
+import platform
 import subprocess
 import sys
 import tempfile
@@ -146,6 +149,68 @@ def errors(found, truth, source, target):
     return degrees, miss, degrees < 5 and miss < 0.1 * radius
 
 
+def percent(shares):
+    return f"{100 * np.mean(shares):.0f}" if len(shares) else "-"
+
+
+def machine():
+    """Processor, cores and load, for the foot of a page with times."""
+    cpu = platform.processor() or platform.machine()
+    info = pathlib.Path("/proc/cpuinfo")
+    if info.exists():
+        cpu = next((w.split(":", 1)[1].strip() for w in info.read_text().splitlines() if w.startswith("model name")), cpu)
+    return f"{os.cpu_count()} cores of {cpu}, load {os.getloadavg()[0]:.1f} at the start"
+
+
+def version(program):
+    return subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout.strip()
+
+
+class Page:
+    """A page of the book and the numbers on it, or both on standard output."""
+
+    def __init__(self, title, command):
+        date = datetime.date.today().isoformat()
+        self.lines = [f"# {title}", "", f"<!-- written by {command.split()[1]}; do not edit -->", "", "```sh", command, "```", ""]
+        self.foot = f"{date}; {machine()}; Open3D {o3d.__version__}"
+        self.numbers = {}
+
+    def add(self, *lines):
+        self.lines += lines
+
+    def readme(self, row, right, answered, seconds, peer_right, peer_seconds):
+        """The row of README's table."""
+        values = {
+            "right": percent(right), "right_answered": percent(right[answered]), "seconds": f"{np.median(seconds):.1f}",
+            "peer": "Open3D, FPFH + RANSAC + ICP", "peer_right": percent(peer_right), "peer_seconds": f"{np.median(peer_seconds):.1f}",
+        }
+        self.numbers |= {f"readme.{row}.{key}": value for key, value in values.items()}
+
+    def write(self, folder, name):
+        text = "\n".join([*self.lines, "", self.foot]) + "\n"
+        numbers = json.dumps(self.numbers, indent=1, ensure_ascii=False) + "\n"
+        if folder is None:
+            print(text, numbers, sep="\n")
+            return
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / f"{name}.md").write_text(text)
+        (folder / f"{name}.json").write_text(numbers)
+
+
+SCANS_TEXT = """\
+All twelve ordered pairs of four range scans of the Stanford bunny (30,000 to 40,000 points; credit: Stanford Computer Graphics
+Laboratory) and one outdoor LiDAR pair (69,000 points, from small_gicp's repository), from the given frames and from random poses:
+with `srrf register` and its defaults, with Open3D's FPFH + RANSAC + ICP (settings in the script), and with small_gicp's GICP.
+
+- A number is the rotation error in degrees. A cross marks a pose that is wrong: by 5 degrees, or by a tenth of the target's radius.
+- `p` is the probability that `srrf` gives its own answer; below 0.5 it abstains.
+- `overlap` is the share of the source that has a target point near it under the true pose.
+- `s` is the wall time of a process that reads both files and writes the pose, `cpu` its user and system time, start and imports
+  included; in brackets the time of the Python peers without their start and without reading.
+- GICP is a local method, and not made for random poses. It is by far the fastest where the given frames are good.
+"""
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scans", type=pathlib.Path)
@@ -153,6 +218,8 @@ def main():
     parser.add_argument("--poses", type=int, default=1, help="random poses of each pair, beside the given frames")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, help="only so many of the pairs: a look, no table to quote")
+    parser.add_argument("--book", type=pathlib.Path, metavar="DIR", help="write scans.md and scans.json here")
     if sys.argv[1:2] == ["--job"]:
         return job(*sys.argv[2:])
     arguments = parser.parse_args()
@@ -168,12 +235,14 @@ def main():
     clouds = [np.asarray(o3d.io.read_point_cloud(str(lidar / f"{n}.ply")).points) for n in ("source", "target")]
     pairs.append(("lidar", *clouds, np.loadtxt(lidar / "T_target_source.txt"), 0.5))
 
-    print("| pair | from | overlap | srrf | p | s | cpu | Open3D | s | cpu | small_gicp | s | cpu |")
-    print("|---" * 13 + "|")
+    page = Page("Real scans", f"python3 scripts/scans.py SCANS --srrf PROGRAM --seed {arguments.seed} --book book/src/generated")
+    page.foot += f"; {version(arguments.srrf)}"
+    page.add(SCANS_TEXT)
+    page.add("| pair | from | overlap | srrf | p | s | cpu | Open3D | s | cpu | small_gicp | s | cpu |", "|---" * 13 + "|")
     rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        for label, source, target, truth, voxel in pairs:
+        for label, source, target, truth, voxel in pairs[: arguments.first]:
             radius = np.sqrt(((target - target.mean(0)) ** 2).sum(1).mean())
             voxel = voxel or radius / 30
             tree = o3d.geometry.KDTreeFlann(cloud(target))
@@ -192,20 +261,30 @@ def main():
                 rows.append((k == 0, e, found, p))
                 cells = [f"{d:.2f}{'' if right else ' ✗'}" for d, _, right in e]
                 times = [f"{wall:.2f}{'' if warm is None else f' ({warm:.2f})'} | {cpu:.2f}" for _, wall, cpu, warm, _ in found]
-                print(f"| {label} | {'given' if k == 0 else 'random'} | {np.mean(near):.2f} | {cells[0]} | {p:.2f} | "
-                      f"{times[0]} | {cells[1]} | {times[1]} | {cells[2]} | {times[2]} |", flush=True)
-    print()
+                page.add(f"| {label} | {'given' if k == 0 else 'random'} | {np.mean(near):.2f} | {cells[0]} | {p:.2f} | "
+                         f"{times[0]} | {cells[1]} | {times[1]} | {cells[2]} | {times[2]} |")
+                print(page.lines[-1], file=sys.stderr, flush=True)
+    page.add("")
     for given in (True, False):
         part = [r for r in rows if r[0] == given]
         right = [sum(r[1][m][2] for r in part) for m in range(3)]
         wall, cpu = ([np.median([r[2][m][which] for r in part]) for m in range(3)] for which in (1, 2))
-        print(f"{'Given frames' if given else 'Random poses'}: of {len(part)} right: srrf {right[0]}, Open3D {right[1]}, "
-              f"small_gicp {right[2]}; median seconds {wall[0]:.2f}, {wall[1]:.2f}, {wall[2]:.2f}, median CPU seconds "
-              f"{cpu[0]:.2f}, {cpu[1]:.2f}, {cpu[2]:.2f}.")
+        page.add(f"- {'Given frames' if given else 'Random poses'}: of {len(part)} right: srrf {right[0]}, Open3D {right[1]}, "
+                 f"small_gicp {right[2]}; median seconds {wall[0]:.2f}, {wall[1]:.2f}, {wall[2]:.2f}, median CPU seconds "
+                 f"{cpu[0]:.2f}, {cpu[1]:.2f}, {cpu[2]:.2f}.")
+        page.numbers |= {f"scans.{'given' if given else 'random'}.{m}.right": str(n)
+                         for m, n in zip(("srrf", "open3d", "small_gicp"), right)}
     faster = sum(r[2][0][1] < r[2][1][1] for r in rows)
-    print(f"srrf took less wall time than Open3D in {faster} of {len(rows)}.")
     silent = sum(1 for r in rows if not r[1][0][2] and r[3] >= 0.5)
-    print(f"srrf was wrong without abstaining in {silent} of {len(rows)}.")
+    page.add(f"- srrf took less wall time than Open3D in {faster} of {len(rows)}.",
+             f"- srrf was wrong without abstaining in {silent} of {len(rows)}.")
+    page.numbers |= {"scans.all": str(len(rows)), "scans.srrf.faster": str(faster), "scans.srrf.silent": str(silent)}
+    for m, method in enumerate(("srrf", "open3d", "small_gicp")):
+        page.numbers[f"scans.{method}.right"] = str(sum(r[1][m][2] for r in rows))
+    right, peer = (np.array([bool(r[1][m][2]) for r in rows]) for m in (0, 1))
+    page.readme("scans", right, np.array([r[3] >= 0.5 for r in rows]), [r[2][0][1] for r in rows], peer,
+                [r[2][1][1] for r in rows])
+    page.write(arguments.book, "scans")
 
 
 if __name__ == "__main__":

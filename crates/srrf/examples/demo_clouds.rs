@@ -1,7 +1,7 @@
-//! Makes the two clouds of `docs/demo`, which the README registers: one built-in airplane of 2.4 m, scanned twice. The
+//! Makes the two clouds of `demo`, which the README registers: one built-in airplane of 2.4 m, scanned twice. The
 //! source lacks a quarter and is noisy; the target has holes and clutter, and is turned by 75 degrees.
 //!
-//! `cargo run -p srrf --example demo_clouds -- [FOLDER]` (default `docs/demo`)
+//! `cargo run -p srrf --example demo_clouds -- [FOLDER]` (default `demo`)
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ use srrf_corrupt::{CorruptionKind, Severity, Variants, corruption};
 const RADIUS: f64 = 1.2;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "docs/demo".into()));
+    let folder = PathBuf::from(std::env::args().nth(1).unwrap_or_else(|| "demo".into()));
     std::fs::create_dir_all(&folder)?;
     let shapes = ProceduralShapes::new(11, 3, Some(&["airplane"]))?;
     let mut rng = ChaCha8Rng::seed_from_u64(2);
