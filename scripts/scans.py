@@ -199,8 +199,9 @@ class Page:
 
 SCANS_TEXT = """\
 All twelve ordered pairs of four range scans of the Stanford bunny (30,000 to 40,000 points; credit: Stanford Computer Graphics
-Laboratory) and one outdoor LiDAR pair (69,000 points, from small_gicp's repository), from the given frames and from random poses:
-with `srrf register` and its defaults, with Open3D's FPFH + RANSAC + ICP (settings in the script), and with small_gicp's GICP.
+Laboratory), and one outdoor LiDAR pair (69,000 points, from small_gicp's repository). Each is registered from the given frames and
+from random poses: with `srrf register` and its defaults, with Open3D's FPFH + RANSAC + ICP (settings in the script), and with
+small_gicp's GICP.
 
 - A number is the rotation error in degrees. A cross marks a pose that is wrong: by 5 degrees, or by a tenth of the target's radius.
 - `p` is the probability that `srrf` gives its own answer; below 0.5 it abstains.
