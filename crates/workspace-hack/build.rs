@@ -1,0 +1,2 @@
+//! Empty: without a build script, Cargo leaves the build dependencies out.
+fn main() {}
