@@ -15,6 +15,7 @@ mod neighbours;
 mod normals;
 pub mod profile;
 mod register;
+mod right;
 mod rigid;
 mod solid;
 mod triangles;
@@ -30,6 +31,7 @@ pub use normals::estimate_normals;
 pub use register::{
     Branch, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, SoftMatch,
 };
+pub use right::{RIGHT_IN_WORDS, RIGHT_RADIUS_SHARE, RIGHT_ROTATION_DEG, is_right};
 pub use rigid::Rigid;
 pub use solid::Solid;
 pub use triangles::Triangles;

@@ -81,7 +81,7 @@ pub struct Registration {
 /// What a method says of its own pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Certainty {
-    /// Probability that the pose is right, in [0, 1].
+    /// Probability that the pose is right ([`is_right`](crate::is_right)), in [0, 1].
     pub probability: f64,
     /// Whether that is too little to rely on the pose.
     pub abstain: bool,

@@ -1,13 +1,9 @@
-//! The seam [`Corruption`], and the registry of the twelve.
+//! The seam [`Corruption`].
 
 use rand::rngs::ChaCha8Rng;
 use srrf_cloud::CloudError;
 
-use crate::corruptions::{
-    Background, Cutout, DensityDec, DensityIncrease, Distortion, DistortionRbf, Gaussian, Impulse, Shear,
-    Uniform, Upsampling,
-};
-use crate::{CorruptionKind, Severity, Variants};
+use crate::severity::Severity;
 
 /// A corrupted cloud that remembers where its points come from.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,15 +23,14 @@ impl Corrupted {
     }
 
     /// The input points whose indices are in `kept`, unmoved.
-    pub(crate) fn subset(points: &[[f64; 3]], kept: &[u32]) -> Self {
-        Self {
-            points: kept.iter().map(|&i| points[i as usize]).collect(),
-            origin: kept.iter().map(|&i| Some(i)).collect(),
-        }
+    /// Indices beyond the cloud name no point and are left out.
+    pub fn subset(points: &[[f64; 3]], kept: &[u32]) -> Self {
+        let (points, origin) = kept.iter().filter_map(|&i| Some((*points.get(i as usize)?, Some(i)))).unzip();
+        Self { points, origin }
     }
 
     /// All input points unmoved, and `added` after them.
-    pub(crate) fn extended(points: &[[f64; 3]], added: impl IntoIterator<Item = [f64; 3]>) -> Self {
+    pub fn extended(points: &[[f64; 3]], added: impl IntoIterator<Item = [f64; 3]>) -> Self {
         let mut extended = Self::moved(points.to_vec());
         extended.points.extend(added);
         extended.origin.resize(extended.points.len(), None);
@@ -71,9 +66,24 @@ pub enum CorruptError {
 ///
 /// The input is expected in the canonical frame (centred, radius 1); other clouds are corrupted
 /// with the same absolute lengths. No corruption normalises its result.
+///
+/// A type outside this crate that implements it is corrupted with as any other, by
+/// [`PairSynthesizer::pair_with`](crate::PairSynthesizer::pair_with).
 pub trait Corruption: Send + Sync {
     /// The name in tables, in snake case.
     fn name(&self) -> &'static str;
+
+    /// Points that a clean cloud should have for `points` corrupted ones; as many, unless the corruption is
+    /// stated for another number.
+    fn clean_points(&self, points: usize) -> usize {
+        points
+    }
+
+    /// Whether ModelNet40-C ends this corruption with [`box_normalize`](crate::box_normalize). No corruption
+    /// does so itself; it is an option of pair synthesis.
+    fn is_box_normalized(&self) -> bool {
+        false
+    }
 
     /// Corrupts `points` (shape `[n, 3]`). The same generator state gives the same result.
     ///
@@ -87,26 +97,11 @@ pub trait Corruption: Send + Sync {
     ) -> Result<Corrupted, CorruptError>;
 }
 
-/// The corruption of this name, in the readings that `variants` chooses.
-pub fn corruption(kind: CorruptionKind, variants: &Variants) -> Box<dyn Corruption> {
-    match kind {
-        CorruptionKind::DensityInc => Box::new(DensityIncrease::new(variants)),
-        CorruptionKind::DensityDec => Box::new(DensityDec),
-        CorruptionKind::Cutout => Box::new(Cutout),
-        CorruptionKind::Uniform => Box::new(Uniform),
-        CorruptionKind::Gaussian => Box::new(Gaussian),
-        CorruptionKind::Background => Box::new(Background),
-        CorruptionKind::Impulse => Box::new(Impulse { linf: variants.impulse_linf }),
-        CorruptionKind::Upsampling => Box::new(Upsampling { linf: variants.upsampling_linf }),
-        CorruptionKind::Shear => Box::new(Shear),
-        CorruptionKind::Distortion => Box::new(Distortion),
-        CorruptionKind::DistortionRbf => Box::new(DistortionRbf::Multiquadric),
-        CorruptionKind::DistortionRbfInv => Box::new(DistortionRbf::InverseMultiquadric),
-    }
-}
-
-/// Checks what every corruption needs.
-pub(crate) fn check(points: &[[f64; 3]], corruption: &'static str, need: usize) -> Result<(), CorruptError> {
+/// Checks what every corruption needs: points, finite coordinates, and at least `need` of them.
+///
+/// # Errors
+/// [`CorruptError`] names `corruption` where there are too few.
+pub fn check_points(points: &[[f64; 3]], corruption: &'static str, need: usize) -> Result<(), CorruptError> {
     if points.is_empty() {
         return Err(CloudError::Empty.into());
     }

@@ -1,39 +1,11 @@
-//! [`CorruptionKind`]: the names of the corruptions.
+//! What can be asked of a [`CorruptionKind`].
 
 use std::{fmt, str::FromStr};
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-/// The paper's twelve corruptions, in its order: density, noise, transformation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum CorruptionKind {
-    /// Clusters grow denser, as under repeated scanning.
-    DensityInc,
-    /// Clusters lose most of their points.
-    DensityDec,
-    /// Clusters are removed.
-    Cutout,
-    /// Uniform noise on every coordinate.
-    Uniform,
-    /// Gaussian noise on every coordinate.
-    Gaussian,
-    /// Clutter in the bounding cube.
-    Background,
-    /// Some points are displaced strongly.
-    Impulse,
-    /// New points appear near existing ones.
-    Upsampling,
-    /// A shear in the x-z plane.
-    Shear,
-    /// Free-form deformation.
-    Distortion,
-    /// Smooth warp by multiquadric radial basis functions.
-    DistortionRbf,
-    /// Smooth warp by inverse multiquadric radial basis functions.
-    DistortionRbfInv,
-}
+use crate::card::Family;
+use crate::corruption::Corruption;
+use crate::corruptions::CorruptionKind;
+use crate::variants::Variants;
 
 /// A name that belongs to no corruption.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -44,55 +16,25 @@ pub struct UnknownCorruption {
 }
 
 impl CorruptionKind {
-    /// All corruptions in the paper's order.
-    pub const ALL: [Self; 12] = [
-        Self::DensityInc,
-        Self::DensityDec,
-        Self::Cutout,
-        Self::Uniform,
-        Self::Gaussian,
-        Self::Background,
-        Self::Impulse,
-        Self::Upsampling,
-        Self::Shear,
-        Self::Distortion,
-        Self::DistortionRbf,
-        Self::DistortionRbfInv,
-    ];
-
     /// The paper's name in snake case.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::DensityInc => "density_inc",
-            Self::DensityDec => "density_dec",
-            Self::Cutout => "cutout",
-            Self::Uniform => "uniform",
-            Self::Gaussian => "gaussian",
-            Self::Background => "background",
-            Self::Impulse => "impulse",
-            Self::Upsampling => "upsampling",
-            Self::Shear => "shear",
-            Self::Distortion => "distortion",
-            Self::DistortionRbf => "distortion_rbf",
-            Self::DistortionRbfInv => "distortion_rbf_inv",
-        }
+        self.card().name
     }
 
-    /// Whether ModelNet40-C ends this corruption with [`box_normalize`](crate::box_normalize). No
-    /// corruption here does so itself; it is an option of pair synthesis.
-    pub fn is_box_normalized(self) -> bool {
-        match self {
-            Self::DensityInc | Self::DensityDec | Self::Cutout | Self::Gaussian => false,
-            Self::Uniform
-            | Self::Background
-            | Self::Impulse
-            | Self::Upsampling
-            | Self::Shear
-            | Self::Distortion
-            | Self::DistortionRbf
-            | Self::DistortionRbfInv => true,
-        }
+    /// The paper's family.
+    pub fn family(self) -> Family {
+        self.card().family
     }
+
+    /// The corruptions of a family, in the paper's order.
+    pub fn of_family(family: Family) -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(move |kind| kind.family() == family)
+    }
+}
+
+/// The corruption of this name, in the readings that `variants` chooses.
+pub fn corruption(kind: CorruptionKind, variants: &Variants) -> Box<dyn Corruption> {
+    (kind.card().build)(variants)
 }
 
 impl fmt::Display for CorruptionKind {
@@ -122,6 +64,12 @@ mod tests {
             assert_eq!(kind.name().parse(), Ok(kind));
             assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
         }
+        assert_eq!(
+            CorruptionKind::of_family(Family::Density).map(CorruptionKind::name).collect::<Vec<_>>(),
+            ["density_inc", "density_dec", "cutout"]
+        );
+        let all = Family::ALL.into_iter().flat_map(CorruptionKind::of_family);
+        assert!(all.eq(CorruptionKind::ALL), "each in one family, families in the paper's order");
         let error = "rain".parse::<CorruptionKind>().unwrap_err().to_string();
         assert!(error.contains("`rain`") && error.contains("density_inc, density_dec"), "{error}");
     }

@@ -2,9 +2,9 @@
 //! made with them.
 //!
 //! Every corruption works in the *canonical frame*: a cloud centred on its mean with radius 1
-//! ([`srrf_cloud::PointCloud::to_unit_sphere`]). All numbers, each with its source, are in
-//! [`parameters`]; where the paper's text and the reference code differ, [`Variants`] names both
-//! and defaults to the text.
+//! ([`srrf_cloud::PointCloud::to_unit_sphere`]). Each has a file of its own in [`corruptions`], with its numbers
+//! and their sources; where the paper's text and the reference code differ, [`Variants`] names both and
+//! defaults to the text.
 //!
 //! ```
 //! use srrf_corrupt::{shapes::ProceduralShapes, datasets::ShapeSource};
@@ -21,6 +21,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod card;
 mod corruption;
 pub mod corruptions;
 pub mod crop;
@@ -28,18 +29,20 @@ pub mod datasets;
 mod kind;
 mod mixture;
 mod normalize;
-mod pair;
-pub mod parameters;
+mod pairs;
 mod severity;
 pub mod shapes;
 mod variants;
 
-pub use corruption::{CorruptError, Corrupted, Corruption, corruption};
-pub use kind::{CorruptionKind, UnknownCorruption};
+pub use card::{Card, Family, REFERENCE_POINTS, Strength};
+pub use corruption::{CorruptError, Corrupted, Corruption, check_points};
+pub use corruptions::CorruptionKind;
+pub use datasets::Label;
+pub use kind::{UnknownCorruption, corruption};
 pub use mixture::Mixture;
 pub use normalize::{BoxFrame, box_normalize};
-pub use pair::{
-    Bases, Corrupt, InvalidConfig, Label, Normalize, Pair, PairConfig, PairError, PairSynthesizer, PoseDraw,
+pub use pairs::{
+    Bases, Corrupt, InvalidConfig, Normalize, Pair, PairConfig, PairError, PairSynthesizer, PoseDraw,
     Purpose, RotationRange, Sampling, Stream, dcp_test_pose, oracle_pose,
 };
 pub use severity::{Severity, SeverityOutOfRange, Stepped};

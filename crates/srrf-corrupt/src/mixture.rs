@@ -6,8 +6,11 @@ use std::fmt;
 use rand::{RngExt, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 
-use crate::corruption::check;
-use crate::{CorruptError, Corrupted, Corruption, CorruptionKind, Severity, Variants, corruption};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::corruptions::CorruptionKind;
+use crate::kind::corruption;
+use crate::severity::Severity;
+use crate::variants::Variants;
 
 /// Two corruptions at once, or one in a part of the cloud only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -80,7 +83,7 @@ impl Corruption for Local {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), 2)?;
+        check_points(points, self.name(), 2)?;
         let direction: [f64; 3] = std::array::from_fn(|_| rng.sample(StandardNormal));
         let height = |index: u32| -> f64 { (0..3).map(|c| points[index as usize][c] * direction[c]).sum() };
         let mut order: Vec<u32> = (0..points.len() as u32).collect();

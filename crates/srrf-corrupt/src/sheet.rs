@@ -3,7 +3,7 @@
 use embedded_graphics::mono_font::ascii::{FONT_7X13, FONT_9X15_BOLD, FONT_10X20};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use srrf_cloud::PointCloud;
-use srrf_corrupt::{CorruptError, Corrupted, CorruptionKind, Severity, Variants, corruption};
+use srrf_corrupt::{CorruptError, Corrupted, CorruptionKind, Family, Severity, Variants, corruption};
 
 use crate::canvas::{Canvas, Colour, Window};
 
@@ -61,36 +61,13 @@ struct Frame {
     depth: f64,
 }
 
-const GROUPS: [(&str, &[CorruptionKind]); 3] = [
-    ("density", &[CorruptionKind::DensityInc, CorruptionKind::DensityDec, CorruptionKind::Cutout]),
-    (
-        "noise",
-        &[
-            CorruptionKind::Uniform,
-            CorruptionKind::Gaussian,
-            CorruptionKind::Background,
-            CorruptionKind::Impulse,
-            CorruptionKind::Upsampling,
-        ],
-    ),
-    (
-        "transformation",
-        &[
-            CorruptionKind::Shear,
-            CorruptionKind::Distortion,
-            CorruptionKind::DistortionRbf,
-            CorruptionKind::DistortionRbfInv,
-        ],
-    ),
-];
-
 impl Sheet<'_> {
     /// Draws the sheet.
     ///
     /// # Errors
     /// [`CorruptError`] if the cloud cannot be corrupted.
     pub fn draw(&self) -> Result<Canvas, CorruptError> {
-        let rows: i32 = GROUPS.iter().map(|(_, kinds)| GROUP + TILE[1] * kinds.len() as i32).sum();
+        let rows = GROUP * Family::ALL.len() as i32 + TILE[1] * CorruptionKind::ALL.len() as i32;
         let width = LABELS + 6 * TILE[0] + 12;
         let mut canvas = Canvas::new(width as u32, (HEADER + rows + FOOTER) as u32, PAPER);
         canvas.text(&self.title, [16, 14], &FONT_10X20, INK);
@@ -101,11 +78,11 @@ impl Sheet<'_> {
         }
         let frame = self.frame();
         let mut y = HEADER;
-        for (group, kinds) in GROUPS {
+        for family in Family::ALL {
             canvas.fill(Window { x: 12, y: y + 4, width: width - 24, height: 1 }, RULE);
-            canvas.text(group, [16, y + 12], &FONT_7X13, GREY);
+            canvas.text(family.name(), [16, y + 12], &FONT_7X13, GREY);
             y += GROUP;
-            for &kind in kinds {
+            for kind in CorruptionKind::of_family(family) {
                 self.row(&mut canvas, &frame, kind, y)?;
                 y += TILE[1];
             }

@@ -7,7 +7,7 @@ use rand::{SeedableRng, rngs::ChaCha8Rng};
 use serde::{Deserialize, de::DeserializeOwned};
 use srrf_cloud::Rigid;
 use srrf_corrupt::corruptions::{
-    DistortionRbf, clip, clusters::split_nearest, distortion, shear::Coefficients,
+    clusters::split_nearest, distortion, gaussian::clip, rbf::Kernel, shear::Coefficients,
 };
 use srrf_corrupt::{Corrupted, Severity, Variants, box_normalize, corruption, dcp_test_pose};
 
@@ -100,9 +100,9 @@ fn deterministic_cores_agree_within_rounding() {
 
     // The systems have condition numbers 3e4 and 8e2, and the two sides solve different ones.
     let shifts = hashed_table(4, 0.1);
-    let warped = DistortionRbf::Multiquadric.deform(points, &shifts).unwrap();
+    let warped = Kernel::Multiquadric.deform(points, &shifts).unwrap();
     assert!(largest_difference(&warped, &expected.distortion_rbf) < 1e-11);
-    let warped = DistortionRbf::InverseMultiquadric.deform(points, &shifts).unwrap();
+    let warped = Kernel::InverseMultiquadric.deform(points, &shifts).unwrap();
     assert!(largest_difference(&warped, &expected.distortion_rbf_inv) < 1e-12);
 
     let mut clipped: Vec<_> = points.iter().map(|p| p.map(|c| 1.5 * c)).collect();

@@ -12,15 +12,18 @@
 //!   value and are not given here.
 //! - Isotropic errors: the angle of `R_gt^T R`, and `|t - t_gt|`. The alternative of RPMNet,
 //!   `|T_gt^-1 T|`, is the same number, since a rotation keeps lengths.
-//! - A pair is recalled when the angle is under 5 degrees and `|t - t_gt|` under 0.1.
+//! - A pair is recalled when the angle is under 5 degrees and `|t - t_gt|` under 0.1. Whether a pose is
+//!   *right*, which a method's own probability is about, is [`is_right`]: the same angle, and an offset that
+//!   is measured at the source's centroid in parts of the target's radius.
 //! - A method that fails on a pair, or answers a pose that is not finite, is scored as if it had
 //!   answered the identity, is never recalled, and is counted in [`Scores::failed`].
 
 use serde::Serialize;
 use srrf_cloud::{EulerXyz, Rigid};
+pub use srrf_cloud::{RIGHT_RADIUS_SHARE, RIGHT_ROTATION_DEG, is_right};
 
-/// Recall: largest isotropic rotation error, in degrees.
-pub const RECALL_ROTATION_DEG: f64 = 5.0;
+/// Recall: largest isotropic rotation error, in degrees; that of a right pose.
+pub const RECALL_ROTATION_DEG: f64 = RIGHT_ROTATION_DEG;
 /// Recall: largest translation error, in the unit of the clouds.
 pub const RECALL_TRANSLATION: f64 = 0.1;
 

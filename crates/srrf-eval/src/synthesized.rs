@@ -195,7 +195,8 @@ impl PairSource for SynthesizedPairs {
                 self.synthesizer.pair(shapes, shape, Some((kind, severity)), pose, stream)
             }
             Condition::Mixed(mixture, severity) => {
-                self.synthesizer.mixed_pair(shapes, shape, (mixture, severity), pose, stream)
+                let corruption = mixture.corruption(&self.synthesizer.config().variants);
+                self.synthesizer.pair_with(shapes, shape, Some((&*corruption, severity)), pose, stream)
             }
         };
         let named = |e: srrf_corrupt::PairError| EvalError::Pair {

@@ -13,7 +13,7 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use srrf::{Features, Logistic, Options, Registrar, RotationRange};
-use srrf_cloud::{PointCloud, Rigid};
+use srrf_cloud::{PointCloud, Rigid, is_right};
 use srrf_corrupt::crop::{crop, random_direction, visible};
 use srrf_corrupt::datasets::{ShapeSource, Split, held_out, open};
 use srrf_corrupt::shapes::ProceduralShapes;
@@ -165,17 +165,6 @@ fn pair(
         }
     }
     (row, source, target, pair.target_from_source)
-}
-
-/// Within 5 degrees, and a tenth of the target's radius where the source's centroid lands.
-fn is_right(found: &Rigid, truth: &Rigid, source: &PointCloud, target: &PointCloud) -> bool {
-    let at = source.centroid().into();
-    let miss = nalgebra::Vector3::from(found.apply(&at)) - nalgebra::Vector3::from(truth.apply(&at));
-    let centre = target.centroid();
-    let square: f64 =
-        target.points().iter().map(|p| (nalgebra::Vector3::from(*p) - centre).norm_squared()).sum();
-    let radius = (square / target.len() as f64).sqrt();
-    found.angle_to_deg(truth) < 5.0 && miss.norm() < 0.1 * radius
 }
 
 /// Prints the reliability curve in ten bins, the Brier score and the expected calibration error.

@@ -3,9 +3,21 @@
 use rand::rngs::ChaCha8Rng;
 
 use super::draws::{in_cube, share};
-use crate::corruption::check;
-use crate::parameters::BACKGROUND_DIVISOR;
-use crate::{CorruptError, Corrupted, Corruption, Severity};
+use crate::card::{Card, Family, Strength};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::severity::Severity;
+
+/// One point is added for each so many points, in the cube `[-1, 1]^3`.
+pub const DIVISOR: [usize; 5] = [45, 40, 35, 30, 20];
+
+/// What the registry says of it.
+pub(super) const CARD: Card = Card {
+    name: "background",
+    family: Family::Noise,
+    summary: "points are added in the cube around",
+    strength: Strength::OneOf(DIVISOR),
+    build: |_| Box::new(Background),
+};
 
 /// Points uniform in the cube `[-1, 1]^3` are added: 22, 25, 29, 34 or 51 to 1,024 points. The
 /// cube bounds the unit sphere, not the shape; the paper's "bounding cube" is read so because the
@@ -15,7 +27,11 @@ pub struct Background;
 
 impl Corruption for Background {
     fn name(&self) -> &'static str {
-        "background"
+        CARD.name
+    }
+
+    fn is_box_normalized(&self) -> bool {
+        true
     }
 
     fn apply(
@@ -24,8 +40,8 @@ impl Corruption for Background {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), 1)?;
-        let count = share(points, severity, &BACKGROUND_DIVISOR);
+        check_points(points, self.name(), 1)?;
+        let count = share(points, severity, &DIVISOR);
         Ok(Corrupted::extended(points, (0..count).map(|_| in_cube(1.0, rng))))
     }
 }

@@ -2,7 +2,17 @@
 
 use rand::{Rng, RngExt};
 
-use crate::parameters::REFERENCE_POINTS;
+use crate::card::REFERENCE_POINTS;
+
+/// Fewest points for which the corruptions of density are defined: below, a cluster of `cutout`
+/// rounds to less than one point.
+pub const MIN_POINTS: usize = 32;
+
+/// `density_inc` and `density_dec`: points of a cluster, the nearest of its centre, which counts.
+pub const CLUSTER_POINTS: usize = 100;
+
+/// `density_inc` and `density_dec`: number of clusters.
+pub const CLUSTERS: [usize; 5] = [1, 2, 3, 4, 5];
 
 /// A count that is stated for 1,024 points, in proportion to `points`; at least 1.
 pub(super) fn scaled(count: usize, points: usize) -> usize {

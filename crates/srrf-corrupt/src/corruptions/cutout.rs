@@ -2,10 +2,25 @@
 
 use rand::rngs::ChaCha8Rng;
 
-use super::clusters::{scaled, take};
-use crate::corruption::check;
-use crate::parameters::{CUTOUT_CLUSTER_POINTS, CUTOUT_CLUSTERS, DENSITY_MIN_POINTS};
-use crate::{CorruptError, Corrupted, Corruption, Severity};
+use super::clusters::{MIN_POINTS, scaled, take};
+use crate::card::{Card, Family, Strength};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::severity::Severity;
+
+/// Points of a cluster, all of which are deleted.
+pub const CLUSTER_POINTS: usize = 30;
+
+/// Number of clusters.
+pub const CLUSTERS: [usize; 5] = [2, 3, 5, 7, 10];
+
+/// What the registry says of it.
+pub(super) const CARD: Card = Card {
+    name: "cutout",
+    family: Family::Density,
+    summary: "clusters of 30 points are removed",
+    strength: Strength::Count("clusters", CLUSTERS),
+    build: |_| Box::new(Cutout),
+};
 
 /// Small clusters are deleted whole. 1,024 points become 964, 934, 874, 814, 724.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,7 +28,7 @@ pub struct Cutout;
 
 impl Corruption for Cutout {
     fn name(&self) -> &'static str {
-        "cutout"
+        CARD.name
     }
 
     fn apply(
@@ -22,10 +37,10 @@ impl Corruption for Cutout {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), DENSITY_MIN_POINTS)?;
-        let size = scaled(CUTOUT_CLUSTER_POINTS, points.len());
+        check_points(points, self.name(), MIN_POINTS)?;
+        let size = scaled(CLUSTER_POINTS, points.len());
         let mut pool: Vec<u32> = (0..points.len() as u32).collect();
-        for _ in 0..severity.of(&CUTOUT_CLUSTERS) {
+        for _ in 0..severity.of(&CLUSTERS) {
             take(points, &mut pool, size, rng);
         }
         Ok(Corrupted::subset(points, &pool))

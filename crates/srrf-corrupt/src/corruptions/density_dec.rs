@@ -3,12 +3,24 @@
 use rand::rngs::ChaCha8Rng;
 
 use super::{
-    clusters::{scaled, take},
+    clusters::{CLUSTER_POINTS, CLUSTERS, MIN_POINTS, scaled, take},
     draws::distinct,
 };
-use crate::corruption::check;
-use crate::parameters::{DENSITY_CLUSTER_POINTS, DENSITY_CLUSTERS, DENSITY_DEC_DELETED, DENSITY_MIN_POINTS};
-use crate::{CorruptError, Corrupted, Corruption, Severity};
+use crate::card::{Card, Family, Strength};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::severity::Severity;
+
+/// Points deleted from each cluster.
+pub const DELETED: usize = 75;
+
+/// What the registry says of it.
+pub(super) const CARD: Card = Card {
+    name: "density_dec",
+    family: Family::Density,
+    summary: "clusters of 100 points lose 75",
+    strength: Strength::Count("clusters", CLUSTERS),
+    build: |_| Box::new(DensityDec),
+};
 
 /// A random three quarters of each cluster are deleted. The quarter that is left may be part of
 /// the next cluster. 1,024 points become 949, 874, 799, 724, 649.
@@ -17,7 +29,7 @@ pub struct DensityDec;
 
 impl Corruption for DensityDec {
     fn name(&self) -> &'static str {
-        "density_dec"
+        CARD.name
     }
 
     fn apply(
@@ -26,11 +38,11 @@ impl Corruption for DensityDec {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), DENSITY_MIN_POINTS)?;
-        let size = scaled(DENSITY_CLUSTER_POINTS, points.len());
-        let deleted = scaled(DENSITY_DEC_DELETED, points.len());
+        check_points(points, self.name(), MIN_POINTS)?;
+        let size = scaled(CLUSTER_POINTS, points.len());
+        let deleted = scaled(DELETED, points.len());
         let mut pool: Vec<u32> = (0..points.len() as u32).collect();
-        for _ in 0..severity.of(&DENSITY_CLUSTERS) {
+        for _ in 0..severity.of(&CLUSTERS) {
             let cluster = take(points, &mut pool, size, rng);
             let survivors = cluster.len().saturating_sub(deleted);
             pool.extend(distinct(cluster.len(), survivors, rng).into_iter().map(|i| cluster[i]));

@@ -3,14 +3,25 @@
 use rand::{Rng, RngExt, rngs::ChaCha8Rng};
 
 use super::{
-    clusters::{scaled, take},
+    clusters::{CLUSTER_POINTS, CLUSTERS, MIN_POINTS, scaled, take},
     draws::{add, in_cube},
 };
-use crate::corruption::check;
-use crate::parameters::{
-    DENSITY_CLUSTER_POINTS, DENSITY_CLUSTERS, DENSITY_INC_DENSE_POINTS, DENSITY_MIN_POINTS, REFERENCE_POINTS,
+use crate::card::{Card, Family, REFERENCE_POINTS, Strength};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::severity::Severity;
+use crate::variants::{DensityInc, Variants};
+
+/// Points of the clouds that ModelNet40-C thins: twice the reference.
+pub const DENSE_POINTS: usize = 2 * REFERENCE_POINTS;
+
+/// What the registry says of it.
+pub(super) const CARD: Card = Card {
+    name: "density_inc",
+    family: Family::Density,
+    summary: "clusters of 100 points gain 100 more",
+    strength: Strength::Count("clusters", CLUSTERS),
+    build: |variants| Box::new(DensityIncrease::new(variants)),
 };
-use crate::{CorruptError, Corrupted, Corruption, DensityInc, Severity, Variants};
 
 /// Clusters of a cloud become denser.
 ///
@@ -35,7 +46,7 @@ impl DensityIncrease {
     }
 
     fn add_points<R: Rng>(&self, points: &[[f64; 3]], clusters: usize, rng: &mut R) -> Corrupted {
-        let size = scaled(DENSITY_CLUSTER_POINTS, points.len());
+        let size = scaled(CLUSTER_POINTS, points.len());
         let mut pool: Vec<u32> = (0..points.len() as u32).collect();
         let dense: Vec<u32> = (0..clusters).flat_map(|_| take(points, &mut pool, size, rng)).collect();
         let added = dense.iter().map(|&i| add(&points[i as usize], &in_cube(self.offset, rng)));
@@ -43,8 +54,8 @@ impl DensityIncrease {
     }
 
     fn thin_the_rest<R: Rng>(points: &[[f64; 3]], clusters: usize, rng: &mut R) -> Corrupted {
-        let keep = points.len() * REFERENCE_POINTS / DENSITY_INC_DENSE_POINTS;
-        let size = scaled(DENSITY_CLUSTER_POINTS, keep);
+        let keep = points.len() * REFERENCE_POINTS / DENSE_POINTS;
+        let size = scaled(CLUSTER_POINTS, keep);
         let mut pool: Vec<u32> = (0..points.len() as u32).collect();
         let mut kept: Vec<u32> = (0..clusters).flat_map(|_| take(points, &mut pool, size, rng)).collect();
         while kept.len() < keep {
@@ -56,7 +67,15 @@ impl DensityIncrease {
 
 impl Corruption for DensityIncrease {
     fn name(&self) -> &'static str {
-        "density_inc"
+        CARD.name
+    }
+
+    /// Twice as many where ModelNet40-C's reading thins them.
+    fn clean_points(&self, points: usize) -> usize {
+        match self.variant {
+            DensityInc::PaperText => points,
+            DensityInc::ModelNet40C => points.saturating_mul(DENSE_POINTS / REFERENCE_POINTS),
+        }
     }
 
     fn apply(
@@ -65,8 +84,8 @@ impl Corruption for DensityIncrease {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), DENSITY_MIN_POINTS)?;
-        let clusters = severity.of(&DENSITY_CLUSTERS);
+        check_points(points, self.name(), MIN_POINTS)?;
+        let clusters = severity.of(&CLUSTERS);
         Ok(match self.variant {
             DensityInc::PaperText => self.add_points(points, clusters, rng),
             DensityInc::ModelNet40C => Self::thin_the_rest(points, clusters, rng),

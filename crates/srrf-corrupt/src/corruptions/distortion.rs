@@ -3,22 +3,38 @@
 use rand::{Rng, rngs::ChaCha8Rng};
 
 use super::draws::in_cube;
-use crate::corruption::check;
-use crate::parameters::{CONTROL_POINTS, CONTROL_POINTS_PER_AXIS, DISTORTION_AMPLITUDE, DISTORTION_BOX_SIDE};
-use crate::{CorruptError, Corrupted, Corruption, Severity};
+use super::lattice::{CONTROL_POINTS_PER_AXIS, Displacements};
+use crate::card::{Card, Family, Strength};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::severity::Severity;
+
+/// Largest displacement of a control point on each coordinate, in units of the lattice's side, [`BOX_SIDE`].
+pub const AMPLITUDE: [f64; 5] = [0.1, 0.2, 0.3, 0.4, 0.5];
+
+/// Side of the lattice's box `[-1, 1]^3`. PyGeM measures displacements in it, so the amplitudes above count double.
+pub const BOX_SIDE: f64 = 2.0;
+
+/// What the registry says of it.
+pub(super) const CARD: Card = Card {
+    name: "distortion",
+    family: Family::Transformation,
+    summary: "free-form deformation by 5 x 5 x 5 control points",
+    strength: Strength::Value("amplitude", AMPLITUDE),
+    build: |_| Box::new(Distortion),
+};
 
 /// A cloud bends as if it were embedded in rubber: all control points of a 5 x 5 x 5 lattice on
 /// `[-1, 1]^3` are displaced, and the points follow by Bernstein polynomials of degree 4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Distortion;
 
-/// Displacements of the lattice's control points, in units of the box side. The control point at
-/// step `(i, j, k)` along x, y, z has index `(5 i + j) 5 + k`.
-pub type Displacements = [[f64; 3]; CONTROL_POINTS];
-
 impl Corruption for Distortion {
     fn name(&self) -> &'static str {
-        "distortion"
+        CARD.name
+    }
+
+    fn is_box_normalized(&self) -> bool {
+        true
     }
 
     fn apply(
@@ -27,21 +43,21 @@ impl Corruption for Distortion {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), 1)?;
+        check_points(points, self.name(), 1)?;
         let displacements = draw_displacements(severity, rng);
         Ok(Corrupted::moved(points.iter().map(|p| deform(p, &displacements)).collect()))
     }
 }
 
-/// Uniform displacements on every coordinate of every control point.
+/// Uniform displacements on every coordinate of every control point, in units of the box side.
 pub fn draw_displacements<R: Rng>(severity: Severity, rng: &mut R) -> Displacements {
-    std::array::from_fn(|_| in_cube(severity.of(&DISTORTION_AMPLITUDE), rng))
+    std::array::from_fn(|_| in_cube(severity.of(&AMPLITUDE), rng))
 }
 
 /// The deformed point `p + side * sum_ijk B_i(u_x) B_j(u_y) B_k(u_z) mu_ijk` with
 /// `u = (p + 1) / 2`. Points outside the box `[-1, 1]^3` stay where they are.
 pub fn deform(point: &[f64; 3], displacements: &Displacements) -> [f64; 3] {
-    let u = point.map(|c| (c + 1.0) / DISTORTION_BOX_SIDE);
+    let u = point.map(|c| (c + 1.0) / BOX_SIDE);
     if u.iter().any(|c| !(0.0..=1.0).contains(c)) {
         return *point;
     }
@@ -51,7 +67,7 @@ pub fn deform(point: &[f64; 3], displacements: &Displacements) -> [f64; 3] {
         for (j, y) in by.iter().enumerate() {
             let row = (CONTROL_POINTS_PER_AXIS * i + j) * CONTROL_POINTS_PER_AXIS;
             for (z, mu) in bz.iter().zip(&displacements[row..row + CONTROL_POINTS_PER_AXIS]) {
-                let weight = DISTORTION_BOX_SIDE * x * y * z;
+                let weight = BOX_SIDE * x * y * z;
                 for c in 0..3 {
                     moved[c] += weight * mu[c];
                 }
@@ -70,6 +86,7 @@ fn bernstein(u: f64) -> [f64; CONTROL_POINTS_PER_AXIS] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::corruptions::lattice::CONTROL_POINTS;
     use crate::corruptions::testing::{cloud, rms_displacement, rng};
 
     #[test]

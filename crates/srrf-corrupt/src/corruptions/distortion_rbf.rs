@@ -1,37 +1,32 @@
-//! `distortion_rbf` and `distortion_rbf_inv`: smooth warps by radial basis functions.
+//! `distortion_rbf`: smooth warp by multiquadric radial basis functions.
 
-use std::f64::consts::PI;
-use std::sync::OnceLock;
+use rand::rngs::ChaCha8Rng;
 
-use nalgebra::{DMatrix, Dyn, LU, Vector3};
-use rand::{Rng, RngExt, rngs::ChaCha8Rng};
+use super::rbf::{Kernel, SHIFT, draw_displacements};
+use crate::card::{Card, Family, Strength};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::severity::Severity;
 
-use crate::corruption::check;
-use crate::parameters::{CONTROL_POINTS, CONTROL_POINTS_PER_AXIS, RBF_RADIUS, RBF_SHIFT};
-use crate::{CorruptError, Corrupted, Corruption, Severity};
+/// What the registry says of it.
+pub(super) const CARD: Card = Card {
+    name: "distortion_rbf",
+    family: Family::Transformation,
+    summary: "warp by 125 multiquadric basis functions",
+    strength: Strength::Value("shift", SHIFT),
+    build: |_| Box::new(DistortionRbf),
+};
 
-/// 125 control points on a regular grid over `[-1, 1]^3` move by the same distance in random
-/// directions, and an interpolant of radial basis functions carries the cloud along.
+/// The warp with the basis function `phi(x) = sqrt(x^2 + r^2)`: see [`Kernel`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DistortionRbf {
-    /// `distortion_rbf`: `phi(x) = sqrt(x^2 + r^2)`.
-    Multiquadric,
-    /// `distortion_rbf_inv`: `phi(x) = 1 / sqrt(x^2 + r^2)`.
-    InverseMultiquadric,
-}
-
-/// Displacements of the control points, canonical unit, in the order of [`control_points`].
-pub type Displacements = [[f64; 3]; CONTROL_POINTS];
-
-/// Unknowns of the interpolation: one weight for each control point, and an affine map.
-const UNKNOWNS: usize = CONTROL_POINTS + 4;
+pub struct DistortionRbf;
 
 impl Corruption for DistortionRbf {
     fn name(&self) -> &'static str {
-        match self {
-            Self::Multiquadric => "distortion_rbf",
-            Self::InverseMultiquadric => "distortion_rbf_inv",
-        }
+        CARD.name
+    }
+
+    fn is_box_normalized(&self) -> bool {
+        true
     }
 
     fn apply(
@@ -40,103 +35,9 @@ impl Corruption for DistortionRbf {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), 1)?;
+        check_points(points, self.name(), 1)?;
         let displacements = draw_displacements(severity, rng);
-        Ok(Corrupted::moved(self.deform(points, &displacements)?))
-    }
-}
-
-/// Directions `(cos a sin g, sin a sin g, cos g)` with `a` and `g` uniform in `(-pi, pi)`, which
-/// is not uniform on the sphere, times the severity's length.
-pub fn draw_displacements<R: Rng>(severity: Severity, rng: &mut R) -> Displacements {
-    let length = severity.of(&RBF_SHIFT);
-    std::array::from_fn(|_| {
-        let [a, g] = std::array::from_fn(|_| (2.0 * rng.random::<f64>() - 1.0) * PI);
-        [length * a.cos() * g.sin(), length * a.sin() * g.sin(), length * g.cos()]
-    })
-}
-
-/// The control points; the one at step `(i, j, k)` along x, y, z has index `(5 i + j) 5 + k`.
-pub fn control_points() -> [[f64; 3]; CONTROL_POINTS] {
-    const N: usize = CONTROL_POINTS_PER_AXIS;
-    let at = |step: usize| 2.0 * step as f64 / (N - 1) as f64 - 1.0;
-    std::array::from_fn(|index| [at(index / (N * N)), at(index / N % N), at(index % N)])
-}
-
-impl DistortionRbf {
-    /// The warped `points` (shape `[n, 3]`), when each control point moves by its displacement:
-    /// `p' = p + sum_i w_i phi(|p - c_i|) + q_0 + Q p`, with the weights from the 129 x 129 system
-    /// `[[Phi, 1, C], [1^T, 0, 0], [C^T, 0, 0]] w = [displacements; 0; 0]`.
-    ///
-    /// The reference interpolates positions, here it is displacements: the same function, since
-    /// the affine part reproduces the identity.
-    ///
-    /// # Errors
-    /// [`CorruptError::Singular`] if the system cannot be factored (it can, for both kernels).
-    pub fn deform(
-        &self,
-        points: &[[f64; 3]],
-        displacements: &Displacements,
-    ) -> Result<Vec<[f64; 3]>, CorruptError> {
-        let rhs =
-            DMatrix::from_fn(
-                UNKNOWNS,
-                3,
-                |row, c| if row < CONTROL_POINTS { displacements[row][c] } else { 0.0 },
-            );
-        let solution = self.factored().solve(&rhs).ok_or(CorruptError::Singular(self.name()))?;
-        let row = |i: usize| [solution[(i, 0)], solution[(i, 1)], solution[(i, 2)]];
-        let weights: Vec<[f64; 3]> = (0..CONTROL_POINTS).map(row).collect();
-        let affine: [[f64; 3]; 4] = std::array::from_fn(|i| row(CONTROL_POINTS + i));
-        let controls = control_points();
-        let mut phi = [0.0; CONTROL_POINTS];
-        Ok(points
-            .iter()
-            .map(|p| {
-                for (value, control) in phi.iter_mut().zip(&controls) {
-                    *value = self.phi((0..3).map(|c| (p[c] - control[c]).powi(2)).sum());
-                }
-                let mut moved: [f64; 3] = std::array::from_fn(|c| {
-                    p[c] + affine[0][c] + p[0] * affine[1][c] + p[1] * affine[2][c] + p[2] * affine[3][c]
-                });
-                for (value, weight) in phi.iter().zip(&weights) {
-                    for c in 0..3 {
-                        moved[c] += value * weight[c];
-                    }
-                }
-                moved
-            })
-            .collect())
-    }
-
-    /// The basis function at a squared distance.
-    fn phi(self, squared: f64) -> f64 {
-        let root = (squared + RBF_RADIUS * RBF_RADIUS).sqrt();
-        match self {
-            Self::Multiquadric => root,
-            Self::InverseMultiquadric => 1.0 / root,
-        }
-    }
-
-    /// The factored system, computed once for each kernel: it depends on nothing else.
-    fn factored(self) -> &'static LU<f64, Dyn, Dyn> {
-        static MULTIQUADRIC: OnceLock<LU<f64, Dyn, Dyn>> = OnceLock::new();
-        static INVERSE: OnceLock<LU<f64, Dyn, Dyn>> = OnceLock::new();
-        let cell = match self {
-            Self::Multiquadric => &MULTIQUADRIC,
-            Self::InverseMultiquadric => &INVERSE,
-        };
-        cell.get_or_init(|| {
-            let controls = control_points().map(Vector3::from);
-            let affine = |i: usize, k: usize| if k == 0 { 1.0 } else { controls[i][k - 1] };
-            DMatrix::from_fn(UNKNOWNS, UNKNOWNS, |i, j| match (i < CONTROL_POINTS, j < CONTROL_POINTS) {
-                (true, true) => self.phi((controls[i] - controls[j]).norm_squared()),
-                (true, false) => affine(i, j - CONTROL_POINTS),
-                (false, true) => affine(j, i - CONTROL_POINTS),
-                (false, false) => 0.0,
-            })
-            .lu()
-        })
+        Ok(Corrupted::moved(Kernel::Multiquadric.deform(points, &displacements)?))
     }
 }
 
@@ -145,58 +46,14 @@ mod tests {
     use super::*;
     use crate::corruptions::testing::{cloud, rms_displacement, rng};
 
-    const BOTH: [DistortionRbf; 2] = [DistortionRbf::Multiquadric, DistortionRbf::InverseMultiquadric];
-
-    #[test]
-    fn control_points_go_where_they_are_sent() {
-        let displacements = draw_displacements(Severity::ALL[4], &mut rng(9));
-        for kernel in BOTH {
-            let moved = kernel.deform(&control_points(), &displacements).unwrap();
-            for ((p, control), d) in moved.iter().zip(control_points()).zip(displacements) {
-                // The condition number is 3e4 at most: 1e-10 leaves two digits to spare.
-                assert!((0..3).all(|c| (p[c] - control[c] - d[c]).abs() < 1e-10));
-                assert!((d.iter().map(|c| c * c).sum::<f64>().sqrt() - 0.125).abs() < 1e-12);
-            }
-        }
-    }
-
-    #[test]
-    fn affine_displacements_are_reproduced_everywhere() {
-        let map = |p: &[f64; 3]| [0.1 + 0.2 * p[1], -0.3 * p[0] + 0.1 * p[2], 0.05 * p[0] - 0.2];
-        let displacements = control_points().map(|c| map(&c));
-        let points = cloud(37);
-        for kernel in BOTH {
-            let moved = kernel.deform(&points, &displacements).unwrap();
-            for (p, q) in points.iter().zip(&moved) {
-                assert!((0..3).all(|c| (q[c] - p[c] - map(p)[c]).abs() < 1e-10));
-            }
-        }
-    }
-
-    #[test]
-    fn directions_favour_the_z_axis() {
-        // By the density of g the mean of z^2 is 1/2 and those of x^2 and y^2 are 1/4; uniform on
-        // the sphere all would be 1/3. Over 25,000 directions the standard error is 0.0023 at most.
-        let mut rng = rng(1);
-        let mut squares = [0.0; 3];
-        for _ in 0..200 {
-            for d in draw_displacements(Severity::ALL[2], &mut rng) {
-                (0..3).for_each(|c| squares[c] += (d[c] / 0.075).powi(2) / 25_000.0);
-            }
-        }
-        assert!((0..3).all(|c| (squares[c] - [0.25, 0.25, 0.5][c]).abs() < 0.01), "{squares:?}");
-    }
-
     #[test]
     fn strength() {
         // Measured on ModelNet40 shapes; spheres are near that.
         let points = cloud(256);
-        let tables = [[0.020, 0.040, 0.061, 0.081, 0.102], [0.019, 0.039, 0.058, 0.078, 0.098]];
-        for (kernel, table) in BOTH.into_iter().zip(tables) {
-            for (severity, rms) in Severity::ALL.into_iter().zip(table) {
-                let found = rms_displacement(&kernel, &points, severity, &mut rng(4), 40);
-                assert!((found / rms - 1.0).abs() < 0.15, "{severity}: {found} against {rms}");
-            }
+        let table = [0.020, 0.040, 0.061, 0.081, 0.102];
+        for (severity, rms) in Severity::ALL.into_iter().zip(table) {
+            let found = rms_displacement(&DistortionRbf, &points, severity, &mut rng(4), 40);
+            assert!((found / rms - 1.0).abs() < 0.15, "{severity}: {found} against {rms}");
         }
     }
 }

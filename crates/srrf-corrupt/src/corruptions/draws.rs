@@ -2,7 +2,7 @@
 
 use rand::{Rng, RngExt, seq::index};
 
-use crate::Severity;
+use crate::severity::Severity;
 
 /// Uniform in `[-half_width, half_width)` on each coordinate.
 pub(super) fn in_cube<R: Rng>(half_width: f64, rng: &mut R) -> [f64; 3] {

@@ -3,9 +3,25 @@
 use rand::{RngExt, rngs::ChaCha8Rng};
 use rand_distr::StandardNormal;
 
-use crate::corruption::check;
-use crate::parameters::{GAUSSIAN_CLIP, GAUSSIAN_SIGMA};
-use crate::{CorruptError, Corrupted, Corruption, Severity};
+use crate::card::{Card, Family, Strength};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::severity::Severity;
+
+/// Standard deviation of the noise on each coordinate.
+pub const SIGMA: [f64; 5] = [0.010, 0.015, 0.020, 0.025, 0.030];
+
+/// Coordinates are clipped to plus and minus this (paper: "constrained within the range of -1 to 1"; the code
+/// clips the coordinates, not the noise).
+pub const CLIP: f64 = 1.0;
+
+/// What the registry says of it.
+pub(super) const CARD: Card = Card {
+    name: "gaussian",
+    family: Family::Noise,
+    summary: "Gaussian noise on every coordinate, clipped to 1",
+    strength: Strength::Value("sigma", SIGMA),
+    build: |_| Box::new(Gaussian),
+};
 
 /// Independent Gaussian noise on every coordinate, after which the coordinates are clipped to
 /// `[-1, 1]`. The clip is why this corruption must run in the canonical frame.
@@ -14,7 +30,7 @@ pub struct Gaussian;
 
 impl Corruption for Gaussian {
     fn name(&self) -> &'static str {
-        "gaussian"
+        CARD.name
     }
 
     fn apply(
@@ -23,8 +39,8 @@ impl Corruption for Gaussian {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), 1)?;
-        let sigma = severity.of(&GAUSSIAN_SIGMA);
+        check_points(points, self.name(), 1)?;
+        let sigma = severity.of(&SIGMA);
         let mut noisy: Vec<[f64; 3]> =
             points.iter().map(|p| p.map(|c| c + sigma * rng.sample::<f64, _>(StandardNormal))).collect();
         clip(&mut noisy);
@@ -35,7 +51,7 @@ impl Corruption for Gaussian {
 /// Clips every coordinate to `[-1, 1]`.
 pub fn clip(points: &mut [[f64; 3]]) {
     for c in points.as_flattened_mut() {
-        *c = c.clamp(-GAUSSIAN_CLIP, GAUSSIAN_CLIP);
+        *c = c.clamp(-CLIP, CLIP);
     }
 }
 

@@ -3,9 +3,21 @@
 use rand::rngs::ChaCha8Rng;
 
 use super::draws::{add, distinct, share, sign};
-use crate::corruption::check;
-use crate::parameters::IMPULSE_DIVISOR;
-use crate::{CorruptError, Corrupted, Corruption, Severity};
+use crate::card::{Card, Family, Strength};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::severity::Severity;
+
+/// One of so many points is displaced.
+pub const DIVISOR: [usize; 5] = [30, 25, 20, 15, 10];
+
+/// What the registry says of it.
+pub(super) const CARD: Card = Card {
+    name: "impulse",
+    family: Family::Noise,
+    summary: "points are displaced by 0.05 on every coordinate",
+    strength: Strength::OneOf(DIVISOR),
+    build: |variants| Box::new(Impulse { linf: variants.impulse_linf }),
+};
 
 /// A few distinct points (34, 40, 51, 68 or 102 of 1,024) are displaced by plus or minus `linf`
 /// on every coordinate, with independent signs, as the reference code does.
@@ -17,7 +29,11 @@ pub struct Impulse {
 
 impl Corruption for Impulse {
     fn name(&self) -> &'static str {
-        "impulse"
+        CARD.name
+    }
+
+    fn is_box_normalized(&self) -> bool {
+        true
     }
 
     fn apply(
@@ -26,9 +42,9 @@ impl Corruption for Impulse {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), 1)?;
+        check_points(points, self.name(), 1)?;
         let mut moved = points.to_vec();
-        for i in distinct(points.len(), share(points, severity, &IMPULSE_DIVISOR), rng) {
+        for i in distinct(points.len(), share(points, severity, &DIVISOR), rng) {
             moved[i] = add(&points[i], &std::array::from_fn(|_| self.linf * sign(rng)));
         }
         Ok(Corrupted::moved(moved))

@@ -1,79 +1,93 @@
-//! One file for each corruption. The deterministic core of each takes its draws as arguments and
-//! is public, so that it can be compared with other implementations number by number.
+//! The registry: one file and one line for each corruption.
+//!
+//! # A new corruption
+//! 1. Write `corruptions/rain.rs`: a type that implements [`Corruption`](crate::Corruption), its numbers with
+//!    their sources, and a `CARD` (name, family, a line for lists, what grows with the severity, how it is made).
+//! 2. Add `Rain = rain,` to the list below, at its end: the order numbers the corruptions in seeds and tables.
+//!
+//! Nothing else changes: the names on the command line and in files, the lists, the contact sheet, the
+//! benchmark's pairs and the training's draws all come from here. A corruption that is not for everybody needs
+//! not even that: see `examples/own_corruption.rs`.
+//!
+//! # Numbers
+//! Tables have one column for each severity, 1 to 5. Unless a line says otherwise the numbers are those of
+//! ModelNet40-C (Sun et al. 2022, `data/generate_c.py` and `data/distortion.py`), on which the paper's corruptions
+//! are built and whose severities it leaves unstated. Lengths are in the canonical unit: clouds have radius 1.
+//! The lengths for which the paper states another number are in [`Variants`](crate::Variants).
+//!
+//! The deterministic core of each corruption takes its draws as arguments and is public, so that it can be
+//! compared with other implementations number by number.
 
-mod background;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::card::Card;
+
 pub mod clusters;
-mod cutout;
-mod density_dec;
-mod density_inc;
-pub mod distortion;
-pub mod distortion_rbf;
 mod draws;
-mod gaussian;
-mod impulse;
-pub mod shear;
-mod uniform;
-mod upsampling;
+pub mod lattice;
+pub mod rbf;
+#[cfg(test)]
+pub(crate) mod testing;
 
-pub use background::Background;
-pub use cutout::Cutout;
-pub use density_dec::DensityDec;
-pub use density_inc::DensityIncrease;
-pub use distortion::Distortion;
-pub use distortion_rbf::DistortionRbf;
-pub use gaussian::{Gaussian, clip};
-pub use impulse::Impulse;
-pub use shear::Shear;
-pub use uniform::Uniform;
-pub use upsampling::Upsampling;
+/// Declares the files, the names and the order of the corruptions.
+macro_rules! corruptions {
+    ($($kind:ident = $file:ident,)+) => {
+        $(pub mod $file;)+
+
+        /// The corruptions by name: the paper's twelve, in its order (density, noise, transformation).
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+        #[serde(rename_all = "snake_case")]
+        pub enum CorruptionKind {
+            $(
+                #[doc = concat!("See [`", stringify!($file), "`](crate::corruptions::", stringify!($file), ").")]
+                $kind,
+            )+
+        }
+
+        impl CorruptionKind {
+            /// All corruptions in the paper's order.
+            pub const ALL: [Self; [$(Self::$kind),+].len()] = [$(Self::$kind),+];
+
+            /// What its file says of it.
+            pub fn card(self) -> &'static Card {
+                match self {
+                    $(Self::$kind => &$file::CARD,)+
+                }
+            }
+        }
+
+        #[cfg(test)]
+        const FILES: [&str; CorruptionKind::ALL.len()] = [$(stringify!($file)),+];
+    };
+}
+
+corruptions! {
+    DensityInc = density_inc,
+    DensityDec = density_dec,
+    Cutout = cutout,
+    Uniform = uniform,
+    Gaussian = gaussian,
+    Background = background,
+    Impulse = impulse,
+    Upsampling = upsampling,
+    Shear = shear,
+    Distortion = distortion,
+    DistortionRbf = distortion_rbf,
+    DistortionRbfInv = distortion_rbf_inv,
+}
 
 #[cfg(test)]
-pub(crate) mod testing {
-    //! What the tests of several corruptions share.
+mod tests {
+    use super::*;
+    use crate::variants::Variants;
 
-    use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
-    use rand_distr::StandardNormal;
-
-    use crate::{Corrupted, Corruption, Severity};
-
-    pub(crate) fn rng(seed: u64) -> ChaCha8Rng {
-        ChaCha8Rng::seed_from_u64(seed)
-    }
-
-    /// `n` points on an ellipsoid within the unit sphere: a shape like those of the data, whose
-    /// rms radius is about 0.6.
-    pub(crate) fn cloud(n: usize) -> Vec<[f64; 3]> {
-        let mut rng = rng(77);
-        (0..n)
-            .map(|_| {
-                let g: [f64; 3] = std::array::from_fn(|_| rng.sample(StandardNormal));
-                let norm = g.iter().map(|c| c * c).sum::<f64>().sqrt();
-                [g[0] / norm, 0.6 * g[1] / norm, 0.3 * g[2] / norm]
-            })
-            .collect()
-    }
-
-    /// Output minus input, for corruptions that move points and add none.
-    pub(crate) fn displacements(points: &[[f64; 3]], out: &Corrupted) -> Vec<[f64; 3]> {
-        assert_eq!(out.points.len(), points.len());
-        assert!(out.origin.iter().enumerate().all(|(i, o)| *o == Some(i as u32)));
-        points.iter().zip(&out.points).map(|(p, q)| std::array::from_fn(|c| q[c] - p[c])).collect()
-    }
-
-    /// Root mean square length of the displacements over all points of `rounds` draws.
-    pub(crate) fn rms_displacement(
-        corruption: &dyn Corruption,
-        points: &[[f64; 3]],
-        severity: Severity,
-        rng: &mut ChaCha8Rng,
-        rounds: usize,
-    ) -> f64 {
-        let sum: f64 = (0..rounds)
-            .map(|_| {
-                let out = corruption.apply(points, severity, rng).unwrap();
-                displacements(points, &out).as_flattened().iter().map(|d| d * d).sum::<f64>()
-            })
-            .sum();
-        (sum / (rounds * points.len()) as f64).sqrt()
+    #[test]
+    fn a_corruption_is_called_as_its_file_everywhere() {
+        for (kind, file) in CorruptionKind::ALL.into_iter().zip(FILES) {
+            assert_eq!(kind.card().name, file);
+            assert_eq!((kind.card().build)(&Variants::paper()).name(), file);
+            assert_eq!(serde_json::to_value(kind).unwrap(), file);
+        }
     }
 }

@@ -3,9 +3,24 @@
 use rand::{Rng, RngExt, rngs::ChaCha8Rng};
 
 use super::draws::sign;
-use crate::corruption::check;
-use crate::parameters::{SHEAR_COEFFICIENT, SHEAR_SPREAD};
-use crate::{CorruptError, Corrupted, Corruption, Severity};
+use crate::card::{Card, Family, Strength};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::severity::Severity;
+
+/// Mean magnitude of a coefficient.
+pub const COEFFICIENT: [f64; 5] = [0.05, 0.10, 0.15, 0.20, 0.25];
+
+/// A magnitude is uniform within this distance of its mean.
+pub const HALF_BAND: f64 = 0.05;
+
+/// What the registry says of it.
+pub(super) const CARD: Card = Card {
+    name: "shear",
+    family: Family::Transformation,
+    summary: "a shear of x and z",
+    strength: Strength::Value("coefficient", COEFFICIENT),
+    build: |_| Box::new(Shear),
+};
 
 /// A linear shear of the x and z axes; y stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,8 +42,8 @@ pub struct Coefficients {
 impl Coefficients {
     /// Each a random sign times a magnitude within 0.05 of the severity's.
     pub fn draw<R: Rng>(severity: Severity, rng: &mut R) -> Self {
-        let mean = severity.of(&SHEAR_COEFFICIENT);
-        let mut coefficient = || sign(rng) * (mean + SHEAR_SPREAD * (2.0 * rng.random::<f64>() - 1.0));
+        let mean = severity.of(&COEFFICIENT);
+        let mut coefficient = || sign(rng) * (mean + HALF_BAND * (2.0 * rng.random::<f64>() - 1.0));
         Self {
             x_from_y: coefficient(),
             x_from_z: coefficient(),
@@ -45,7 +60,11 @@ impl Coefficients {
 
 impl Corruption for Shear {
     fn name(&self) -> &'static str {
-        "shear"
+        CARD.name
+    }
+
+    fn is_box_normalized(&self) -> bool {
+        true
     }
 
     fn apply(
@@ -54,7 +73,7 @@ impl Corruption for Shear {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), 1)?;
+        check_points(points, self.name(), 1)?;
         let coefficients = Coefficients::draw(severity, rng);
         Ok(Corrupted::moved(points.iter().map(|p| coefficients.apply(p)).collect()))
     }

@@ -3,9 +3,21 @@
 use rand::rngs::ChaCha8Rng;
 
 use super::draws::{add, in_cube};
-use crate::corruption::check;
-use crate::parameters::UNIFORM_HALF_WIDTH;
-use crate::{CorruptError, Corrupted, Corruption, Severity};
+use crate::card::{Card, Family, Strength};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::severity::Severity;
+
+/// Largest noise on each coordinate.
+pub const HALF_WIDTH: [f64; 5] = [0.01, 0.02, 0.03, 0.04, 0.05];
+
+/// What the registry says of it.
+pub(super) const CARD: Card = Card {
+    name: "uniform",
+    family: Family::Noise,
+    summary: "uniform noise on every coordinate",
+    strength: Strength::Value("half width", HALF_WIDTH),
+    build: |_| Box::new(Uniform),
+};
 
 /// Independent uniform noise on every coordinate of every point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,7 +25,11 @@ pub struct Uniform;
 
 impl Corruption for Uniform {
     fn name(&self) -> &'static str {
-        "uniform"
+        CARD.name
+    }
+
+    fn is_box_normalized(&self) -> bool {
+        true
     }
 
     fn apply(
@@ -22,8 +38,8 @@ impl Corruption for Uniform {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), 1)?;
-        let half_width = severity.of(&UNIFORM_HALF_WIDTH);
+        check_points(points, self.name(), 1)?;
+        let half_width = severity.of(&HALF_WIDTH);
         Ok(Corrupted::moved(points.iter().map(|p| add(p, &in_cube(half_width, rng))).collect()))
     }
 }

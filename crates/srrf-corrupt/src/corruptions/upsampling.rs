@@ -3,9 +3,21 @@
 use rand::rngs::ChaCha8Rng;
 
 use super::draws::{add, distinct, in_cube, share};
-use crate::corruption::check;
-use crate::parameters::UPSAMPLING_DIVISOR;
-use crate::{CorruptError, Corrupted, Corruption, Severity};
+use crate::card::{Card, Family, Strength};
+use crate::corruption::{CorruptError, Corrupted, Corruption, check_points};
+use crate::severity::Severity;
+
+/// One of so many points is copied.
+pub const DIVISOR: [usize; 5] = [5, 4, 3, 2, 1];
+
+/// What the registry says of it.
+pub(super) const CARD: Card = Card {
+    name: "upsampling",
+    family: Family::Noise,
+    summary: "points are added within 0.08 of others",
+    strength: Strength::OneOf(DIVISOR),
+    build: |variants| Box::new(Upsampling { linf: variants.upsampling_linf }),
+};
 
 /// Copies of distinct random points, each with an offset uniform in `[-linf, linf]^3`, are added:
 /// 204, 256, 341, 512 or 1,024 to 1,024 points.
@@ -17,7 +29,11 @@ pub struct Upsampling {
 
 impl Corruption for Upsampling {
     fn name(&self) -> &'static str {
-        "upsampling"
+        CARD.name
+    }
+
+    fn is_box_normalized(&self) -> bool {
+        true
     }
 
     fn apply(
@@ -26,8 +42,8 @@ impl Corruption for Upsampling {
         severity: Severity,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        check(points, self.name(), 1)?;
-        let copied = distinct(points.len(), share(points, severity, &UPSAMPLING_DIVISOR), rng);
+        check_points(points, self.name(), 1)?;
+        let copied = distinct(points.len(), share(points, severity, &DIVISOR), rng);
         Ok(Corrupted::extended(points, copied.into_iter().map(|i| add(&points[i], &in_cube(self.linf, rng)))))
     }
 }

@@ -5,9 +5,12 @@ use std::path::{Path, PathBuf};
 use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 
-use super::{ShapeSource, SourceError, Split};
 use srrf_cloud::PointCloud;
 use srrf_cloud::io::{is_cloud_file, read_cloud};
+
+use super::catalogue::{Catalogue, Entry, Listed, checked};
+use super::error::SourceError;
+use super::source::Split;
 
 /// Depth to which folders in folders are searched.
 const MAX_DEPTH: usize = 8;
@@ -18,16 +21,8 @@ const MAX_DEPTH: usize = 8;
 /// The points of a scan are often in the order of the scan, so a sampling takes random ones.
 #[derive(Debug)]
 pub(super) struct Folder {
-    description: String,
-    files: Vec<CloudFile>,
-}
-
-#[derive(Debug)]
-struct CloudFile {
-    path: PathBuf,
-    /// The path below the root, without extension.
-    id: String,
-    class: String,
+    /// With the path of each file. A shape is called by its path below the root, without extension.
+    files: Catalogue<PathBuf>,
 }
 
 /// All files with clouds in `root` and the folders in it, or `root` itself if it is such a file;
@@ -49,18 +44,18 @@ pub(super) fn open(root: &Path, split: Split) -> Result<Option<Folder>, SourceEr
         return Ok(None);
     }
     paths.sort();
-    let files: Vec<CloudFile> = paths
+    let files: Vec<Entry<PathBuf>> = paths
         .into_iter()
         .map(|path| {
             let below = path.strip_prefix(&top).ok().filter(|p| p.file_name().is_some());
             let below = below.unwrap_or(path.file_name().map_or(Path::new(""), Path::new)).with_extension("");
             let class = below.parent().and_then(Path::file_name).unwrap_or_default();
             let class = class.to_string_lossy().into_owned();
-            CloudFile { id: below.to_string_lossy().into_owned(), class, path }
+            Entry::new(below.to_string_lossy().into_owned(), class, path)
         })
         .collect();
     let description = format!("clouds in files{part}: {} shapes, {}", files.len(), root.display());
-    Ok(Some(Folder { description, files }))
+    Ok(Some(Folder { files: Catalogue::new(description, files) }))
 }
 
 /// Adds the files with clouds below `folder`. Links to folders are not followed, so there is an end.
@@ -87,55 +82,43 @@ fn is_note(path: &Path) -> bool {
     ["readme", "license", "licence", "notice", "notes"].contains(&stem.as_str())
 }
 
-impl Folder {
-    fn drawn(&self, index: usize, count: usize, rng: &mut ChaCha8Rng) -> Result<Vec<[f64; 3]>, SourceError> {
-        let file = self.files.get(index).ok_or(SourceError::NoSuchShape { index, len: self.files.len() })?;
-        let (unit, _) = read_cloud(&file.path)?.to_unit_sphere();
-        let mut points = unit.into_points();
-        Ok(points.partial_shuffle(rng, count).0.to_vec())
-    }
-
-    fn cloud(&self, index: usize, points: &[[f64; 3]]) -> Result<PointCloud, SourceError> {
-        PointCloud::new(points.to_vec()).map_err(|source| SourceError::Shape {
-            path: self.files[index].path.clone(),
-            shape: index.to_string(),
-            source,
-        })
-    }
+/// `count` random points of the file, none of them twice.
+fn drawn(path: &Path, count: usize, rng: &mut ChaCha8Rng) -> Result<Vec<[f64; 3]>, SourceError> {
+    let (unit, _) = read_cloud(path)?.to_unit_sphere();
+    let mut points = unit.into_points();
+    Ok(points.partial_shuffle(rng, count).0.to_vec())
 }
 
-impl ShapeSource for Folder {
-    fn len(&self) -> usize {
-        self.files.len()
-    }
+impl Listed for Folder {
+    type Item = PathBuf;
 
-    fn description(&self) -> String {
-        self.description.clone()
-    }
-
-    fn id(&self, index: usize) -> String {
-        self.files.get(index).map(|file| file.id.clone()).unwrap_or_default()
-    }
-
-    fn class(&self, index: usize) -> &str {
-        self.files.get(index).map_or("", |file| &file.class)
+    fn catalogue(&self) -> &Catalogue<PathBuf> {
+        &self.files
     }
 
     /// `count` random points of the file, none of them twice.
-    fn sample(&self, index: usize, count: usize, rng: &mut ChaCha8Rng) -> Result<PointCloud, SourceError> {
-        self.cloud(index, &self.drawn(index, count, rng)?)
+    fn draw(
+        &self,
+        file: &Entry<PathBuf>,
+        index: usize,
+        count: usize,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<PointCloud, SourceError> {
+        checked(drawn(&file.item, count, rng)?, &file.item, index)
     }
 
     /// Two disjoint random parts of the file; each at most half of it.
-    fn sample_two(
+    fn draw_two(
         &self,
+        file: &Entry<PathBuf>,
         index: usize,
         count: usize,
         rng: &mut ChaCha8Rng,
     ) -> Result<(PointCloud, PointCloud), SourceError> {
-        let points = self.drawn(index, count.saturating_mul(2), rng)?;
+        let points = drawn(&file.item, count.saturating_mul(2), rng)?;
         let (first, second) = points.split_at(points.len() / 2);
-        Ok((self.cloud(index, first)?, self.cloud(index, &second[..first.len()])?))
+        let second = &second[..first.len()];
+        Ok((checked(first.to_vec(), &file.item, index)?, checked(second.to_vec(), &file.item, index)?))
     }
 }
 

@@ -10,9 +10,12 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::stored::{StoredCloud, StoredClouds};
-use super::{SourceError, Split};
 use srrf_cloud::CloudError;
+
+use super::catalogue::{Catalogue, Entry};
+use super::error::SourceError;
+use super::source::Split;
+use super::stored::{StoredClouds, StoredPoints};
 
 /// Most bytes that one stored byte can unpack to: deflate's bound is 1032.
 const MAX_EXPANSION: u64 = 1040;
@@ -39,16 +42,16 @@ pub(super) fn open(path: &Path, split: Split) -> Result<StoredClouds, SourceErro
         });
     }
     let classes = class_names(folder)?;
-    let loaded: Vec<Vec<StoredCloud>> =
+    let loaded: Vec<Vec<Entry<StoredPoints>>> =
         files.par_iter().map(|file| load(file, &classes)).collect::<Result<_, _>>()?;
-    let clouds: Vec<StoredCloud> = loaded.into_iter().flatten().collect();
-    let Some(points) = clouds.first().map(|c| c.points.len()) else {
+    let clouds: Vec<Entry<StoredPoints>> = loaded.into_iter().flatten().collect();
+    let Some(points) = clouds.first().map(|c| c.item.len()) else {
         return Err(SourceError::layout(path, "there are no shapes in the HDF5 files"));
     };
     let part = if path.is_file() { "one file".to_owned() } else { format!("{split} split") };
     let description =
         format!("ModelNet40 (HDF5), {part}: {} shapes of {points} points, {}", clouds.len(), path.display());
-    Ok(StoredClouds { description, path: path.to_owned(), clouds })
+    Ok(StoredClouds { path: path.to_owned(), clouds: Catalogue::new(description, clouds) })
 }
 
 /// The HDF5 files of the list of `split`, by file name alone since the folders in the lists are
@@ -98,7 +101,7 @@ fn class_names(folder: &Path) -> Result<Vec<String>, SourceError> {
     Ok(text.lines().map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect())
 }
 
-fn load(path: &Path, classes: &[String]) -> Result<Vec<StoredCloud>, SourceError> {
+fn load(path: &Path, classes: &[String]) -> Result<Vec<Entry<StoredPoints>>, SourceError> {
     let bytes = fs::read(path).map_err(|e| SourceError::io(path, e))?;
     let size = bytes.len() as u64;
     let file = hdf5_pure::File::from_bytes(bytes).map_err(|e| SourceError::hdf5(path, e))?;
@@ -137,11 +140,9 @@ fn load(path: &Path, classes: &[String]) -> Result<Vec<StoredCloud>, SourceError
         if points == 0 {
             return Err(SourceError::layout(path, "the shapes of dataset `data` have no points"));
         }
-        clouds.push(StoredCloud {
-            id: names.get(row).cloned().unwrap_or_else(|| format!("{}_{row:04}", file_stem(path))),
-            class: labels.get(row).and_then(|&l| classes.get(l as usize)).cloned().unwrap_or_default(),
-            points: cloud.to_vec(),
-        });
+        let id = names.get(row).cloned().unwrap_or_else(|| format!("{}_{row:04}", file_stem(path)));
+        let class = labels.get(row).and_then(|&l| classes.get(l as usize)).cloned().unwrap_or_default();
+        clouds.push(Entry::new(id, class, cloud.to_vec()));
     }
     Ok(clouds)
 }

@@ -8,10 +8,12 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 
-use super::{ShapeSource, SourceError, Split};
-use srrf_cloud::Triangles;
 use srrf_cloud::io::{IoError, off};
-use srrf_cloud::{PointCloud, UnitSphere};
+use srrf_cloud::{PointCloud, Triangles, UnitSphere};
+
+use super::catalogue::{Catalogue, Entry, Listed, checked};
+use super::error::SourceError;
+use super::source::Split;
 
 /// Points from which the centre and radius of a mesh are estimated.
 const FRAME_POINTS: usize = 4096;
@@ -25,14 +27,12 @@ const FRAME_SEED: u64 = 40;
 /// points of the surface: all samplings of a mesh share one frame.
 #[derive(Debug)]
 pub(super) struct ModelnetOff {
-    description: String,
-    meshes: Vec<Mesh>,
+    meshes: Catalogue<Mesh>,
 }
 
 #[derive(Debug)]
-struct Mesh {
+pub(super) struct Mesh {
     path: PathBuf,
-    class: String,
     frame: OnceLock<UnitSphere>,
 }
 
@@ -76,7 +76,8 @@ pub(super) fn open(folder: &Path, split: Split) -> Result<ModelnetOff, SourceErr
     let classes = split_folders(folder, split);
     for (class, inner) in &classes {
         for path in meshes_in(inner)? {
-            meshes.push(Mesh { path, class: class.clone(), frame: OnceLock::new() });
+            let id = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            meshes.push(Entry::new(id, class.clone(), Mesh { path, frame: OnceLock::new() }));
         }
     }
     if meshes.is_empty() {
@@ -89,37 +90,35 @@ pub(super) fn open(folder: &Path, split: Split) -> Result<ModelnetOff, SourceErr
         classes.len(),
         folder.display()
     );
-    Ok(ModelnetOff { description, meshes })
+    Ok(ModelnetOff { meshes: Catalogue::new(description, meshes) })
 }
 
-impl ModelnetOff {
+impl Mesh {
     fn load(&self, index: usize) -> Result<(Triangles, UnitSphere), SourceError> {
-        let mesh =
-            self.meshes.get(index).ok_or(SourceError::NoSuchShape { index, len: self.meshes.len() })?;
         let bytes =
-            fs::read(&mesh.path).map_err(|source| IoError::Read { path: mesh.path.clone(), source })?;
+            fs::read(&self.path).map_err(|source| IoError::Read { path: self.path.clone(), source })?;
         let parsed =
-            off::parse_mesh(&bytes).map_err(|source| IoError::Format { path: mesh.path.clone(), source })?;
+            off::parse_mesh(&bytes).map_err(|source| IoError::Format { path: self.path.clone(), source })?;
         let mut surface = Triangles::default();
         for corners in &parsed.triangles {
             let [a, b, c] = corners.map(|corner| Vector3::from(parsed.vertices[corner]));
             surface.push(a, b, c);
         }
         if surface.area() <= 0.0 {
-            return Err(SourceError::layout(&mesh.path, "the mesh has no surface to draw points from"));
+            return Err(SourceError::layout(&self.path, "the mesh has no surface to draw points from"));
         }
-        let frame = match mesh.frame.get() {
+        let frame = match self.frame.get() {
             Some(frame) => *frame,
             None => {
                 let mut rng = ChaCha8Rng::seed_from_u64(FRAME_SEED);
-                let found = self.draw(&surface, None, index, FRAME_POINTS, &mut rng)?.to_unit_sphere().1;
-                *mesh.frame.get_or_init(|| found)
+                let found = self.points(&surface, None, index, FRAME_POINTS, &mut rng)?.to_unit_sphere().1;
+                *self.frame.get_or_init(|| found)
             }
         };
         Ok((surface, frame))
     }
 
-    fn draw(
+    fn points(
         &self,
         surface: &Triangles,
         frame: Option<&UnitSphere>,
@@ -131,53 +130,45 @@ impl ModelnetOff {
             let point = surface.sample(rng).into();
             frame.map_or(point, |frame| frame.apply(&point))
         });
-        PointCloud::new(points.collect()).map_err(|source| SourceError::Shape {
-            path: self.meshes[index].path.clone(),
-            shape: index.to_string(),
-            source,
-        })
+        checked(points.collect(), &self.path, index)
     }
 }
 
-impl ShapeSource for ModelnetOff {
-    fn len(&self) -> usize {
-        self.meshes.len()
+impl Listed for ModelnetOff {
+    type Item = Mesh;
+
+    fn catalogue(&self) -> &Catalogue<Mesh> {
+        &self.meshes
     }
 
-    fn description(&self) -> String {
-        self.description.clone()
-    }
-
-    fn id(&self, index: usize) -> String {
-        let stem = self.meshes.get(index).and_then(|mesh| mesh.path.file_stem());
-        stem.unwrap_or_default().to_string_lossy().into_owned()
-    }
-
-    fn class(&self, index: usize) -> &str {
-        self.meshes.get(index).map_or("", |mesh| &mesh.class)
-    }
-
-    fn sample(&self, index: usize, count: usize, rng: &mut ChaCha8Rng) -> Result<PointCloud, SourceError> {
-        let (surface, frame) = self.load(index)?;
-        self.draw(&surface, Some(&frame), index, count, rng)
-    }
-
-    fn sample_two(
+    fn draw(
         &self,
+        mesh: &Entry<Mesh>,
+        index: usize,
+        count: usize,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<PointCloud, SourceError> {
+        let (surface, frame) = mesh.item.load(index)?;
+        mesh.item.points(&surface, Some(&frame), index, count, rng)
+    }
+
+    fn draw_two(
+        &self,
+        mesh: &Entry<Mesh>,
         index: usize,
         count: usize,
         rng: &mut ChaCha8Rng,
     ) -> Result<(PointCloud, PointCloud), SourceError> {
-        let (surface, frame) = self.load(index)?;
-        let first = self.draw(&surface, Some(&frame), index, count, rng)?;
-        Ok((first, self.draw(&surface, Some(&frame), index, count, rng)?))
+        let (surface, frame) = mesh.item.load(index)?;
+        let first = mesh.item.points(&surface, Some(&frame), index, count, rng)?;
+        Ok((first, mesh.item.points(&surface, Some(&frame), index, count, rng)?))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::datasets;
+    use crate::datasets::{self, ShapeSource};
 
     /// A box of 2 x 4 x 6 about (10, 20, 30), its faces as quadrilaterals.
     fn write_box(path: &Path, header: &str) {

@@ -10,17 +10,19 @@ use std::path::{Path, PathBuf};
 use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
 
-use super::{ShapeSource, SourceError, Split};
 use srrf_cloud::PointCloud;
 use srrf_cloud::io::{FormatError, IoError, parse_point};
+
+use super::catalogue::{Catalogue, Entry, Listed, checked};
+use super::error::SourceError;
+use super::source::Split;
 
 /// Shapes that are read from disk at each sampling, so that memory stays small.
 #[derive(Debug)]
 pub(super) struct ResampledText {
-    description: String,
     folder: PathBuf,
-    /// Class and name.
-    shapes: Vec<(String, String)>,
+    /// With the file of each shape.
+    shapes: Catalogue<PathBuf>,
 }
 
 fn list_of(folder: &Path, split: Split) -> PathBuf {
@@ -36,7 +38,7 @@ pub(super) fn detect(folder: &Path) -> bool {
 pub(super) fn open(folder: &Path, split: Split) -> Result<ResampledText, SourceError> {
     let list = list_of(folder, split);
     let text = fs::read_to_string(&list).map_err(|e| SourceError::io(&list, e))?;
-    let mut shapes = Vec::new();
+    let (mut shapes, mut classes) = (Vec::new(), Vec::new());
     for (number, line) in text.lines().enumerate() {
         let name = line.trim();
         if name.is_empty() {
@@ -46,13 +48,14 @@ pub(super) fn open(folder: &Path, split: Split) -> Result<ResampledText, SourceE
             let problem = format!("line {}: {name:?} is no name such as airplane_0001", number + 1);
             return Err(SourceError::layout(&list, problem));
         };
-        shapes.push((class.to_owned(), name.to_owned()));
+        let file = folder.join(class).join(format!("{name}.txt"));
+        classes.push(class);
+        shapes.push(Entry::new(name.to_owned(), class.to_owned(), file));
     }
     if shapes.is_empty() {
         return Err(SourceError::layout(&list, "the list is empty"));
     }
-    let mut classes: Vec<&String> = shapes.iter().map(|(class, _)| class).collect();
-    classes.sort();
+    classes.sort_unstable();
     classes.dedup();
     let description = format!(
         "ModelNet40 (resampled text), {split} split: {} shapes of {} classes, {}",
@@ -60,77 +63,62 @@ pub(super) fn open(folder: &Path, split: Split) -> Result<ResampledText, SourceE
         classes.len(),
         folder.display()
     );
-    Ok(ResampledText { description, folder: folder.to_owned(), shapes })
+    Ok(ResampledText { folder: folder.to_owned(), shapes: Catalogue::new(description, shapes) })
 }
 
-impl ResampledText {
-    /// At most the first `limit` points.
-    fn read(&self, index: usize, limit: usize) -> Result<Vec<[f64; 3]>, SourceError> {
-        let (class, name) =
-            self.shapes.get(index).ok_or(SourceError::NoSuchShape { index, len: self.shapes.len() })?;
-        let path = self.folder.join(class).join(format!("{name}.txt"));
-        let failed = |source| IoError::Read { path: path.clone(), source };
-        let mut points = Vec::new();
-        for (number, line) in BufReader::new(File::open(&path).map_err(failed)?).lines().enumerate() {
-            if points.len() == limit {
-                break;
-            }
-            let line = line.map_err(failed)?;
-            if line.trim().is_empty() {
-                continue;
-            }
-            let point = parse_point(&line).map_err(|problem| IoError::Format {
-                path: path.clone(),
-                source: FormatError::Line { line: number + 1, problem },
-            })?;
-            points.push(point);
+/// At most the first `limit` points of a file.
+fn read(path: &Path, limit: usize) -> Result<Vec<[f64; 3]>, SourceError> {
+    let failed = |source| IoError::Read { path: path.to_owned(), source };
+    let mut points = Vec::new();
+    for (number, line) in BufReader::new(File::open(path).map_err(failed)?).lines().enumerate() {
+        if points.len() == limit {
+            break;
         }
-        Ok(points)
+        let line = line.map_err(failed)?;
+        if line.trim().is_empty() {
+            continue;
+        }
+        let point = parse_point(&line).map_err(|problem| IoError::Format {
+            path: path.to_owned(),
+            source: FormatError::Line { line: number + 1, problem },
+        })?;
+        points.push(point);
     }
-
-    fn cloud(&self, index: usize, points: Vec<[f64; 3]>) -> Result<PointCloud, SourceError> {
-        PointCloud::new(points).map_err(|source| SourceError::Shape {
-            path: self.folder.clone(),
-            shape: self.id(index),
-            source,
-        })
-    }
+    Ok(points)
 }
 
-impl ShapeSource for ResampledText {
-    fn len(&self) -> usize {
-        self.shapes.len()
-    }
+impl Listed for ResampledText {
+    type Item = PathBuf;
 
-    fn description(&self) -> String {
-        self.description.clone()
-    }
-
-    fn id(&self, index: usize) -> String {
-        self.shapes.get(index).map(|(_, name)| name.clone()).unwrap_or_default()
-    }
-
-    fn class(&self, index: usize) -> &str {
-        self.shapes.get(index).map_or("", |(class, _)| class)
+    fn catalogue(&self) -> &Catalogue<PathBuf> {
+        &self.shapes
     }
 
     /// The first `count` points.
-    fn sample(&self, index: usize, count: usize, _rng: &mut ChaCha8Rng) -> Result<PointCloud, SourceError> {
-        self.cloud(index, self.read(index, count)?)
+    fn draw(
+        &self,
+        shape: &Entry<PathBuf>,
+        _index: usize,
+        count: usize,
+        _rng: &mut ChaCha8Rng,
+    ) -> Result<PointCloud, SourceError> {
+        checked(read(&shape.item, count)?, &self.folder, shape.id())
     }
 
     /// Two disjoint random parts of the stored points; each at most half of them.
-    fn sample_two(
+    fn draw_two(
         &self,
-        index: usize,
+        shape: &Entry<PathBuf>,
+        _index: usize,
         count: usize,
         rng: &mut ChaCha8Rng,
     ) -> Result<(PointCloud, PointCloud), SourceError> {
-        let mut points = self.read(index, usize::MAX)?;
+        let mut points = read(&shape.item, usize::MAX)?;
         let each = count.min(points.len() / 2);
         let (drawn, _) = points.partial_shuffle(rng, 2 * each);
         let (first, second) = drawn.split_at(each);
-        Ok((self.cloud(index, first.to_vec())?, self.cloud(index, second.to_vec())?))
+        let cloud = |points: &[[f64; 3]]| checked(points.to_vec(), &self.folder, shape.id());
+        Ok((cloud(first)?, cloud(second)?))
     }
 }
 
@@ -139,7 +127,7 @@ mod tests {
     use rand::SeedableRng;
 
     use super::*;
-    use crate::datasets;
+    use crate::datasets::{self, ShapeSource};
 
     fn rng() -> ChaCha8Rng {
         ChaCha8Rng::seed_from_u64(1)

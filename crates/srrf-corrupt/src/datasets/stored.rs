@@ -4,75 +4,57 @@ use std::path::PathBuf;
 
 use rand::rngs::ChaCha8Rng;
 use rand::seq::SliceRandom;
-
-use super::{ShapeSource, SourceError};
 use srrf_cloud::PointCloud;
 
-/// One shape in memory.
-#[derive(Debug, Clone)]
-pub(crate) struct StoredCloud {
-    pub id: String,
-    pub class: String,
-    /// Shape `[n, 3]`, finite, single precision to halve the memory of a data set.
-    pub points: Vec<[f32; 3]>,
-}
+use super::catalogue::{Catalogue, Entry, Listed, checked};
+use super::error::SourceError;
+
+/// The points of one shape, `[n, 3]`, finite; single precision to halve the memory of a data set.
+pub(super) type StoredPoints = Vec<[f32; 3]>;
 
 /// Shapes kept in memory as clouds.
 #[derive(Debug)]
-pub(crate) struct StoredClouds {
-    pub description: String,
-    pub path: PathBuf,
-    /// Never empty.
-    pub clouds: Vec<StoredCloud>,
+pub(super) struct StoredClouds {
+    pub(super) path: PathBuf,
+    pub(super) clouds: Catalogue<StoredPoints>,
 }
 
 impl StoredClouds {
-    fn get(&self, index: usize) -> Result<&StoredCloud, SourceError> {
-        self.clouds.get(index).ok_or(SourceError::NoSuchShape { index, len: self.clouds.len() })
-    }
-
-    fn cloud(&self, index: usize, points: impl Iterator<Item = [f32; 3]>) -> Result<PointCloud, SourceError> {
-        PointCloud::new(points.map(|p| p.map(f64::from)).collect()).map_err(|source| SourceError::Shape {
-            path: self.path.clone(),
-            shape: self.id(index),
-            source,
-        })
+    fn cloud(&self, shape: &Entry<StoredPoints>, points: &[[f32; 3]]) -> Result<PointCloud, SourceError> {
+        checked(points.iter().map(|p| p.map(f64::from)).collect(), &self.path, shape.id())
     }
 }
 
-impl ShapeSource for StoredClouds {
-    fn len(&self) -> usize {
-        self.clouds.len()
-    }
+impl Listed for StoredClouds {
+    type Item = StoredPoints;
 
-    fn description(&self) -> String {
-        self.description.clone()
-    }
-
-    fn id(&self, index: usize) -> String {
-        self.clouds.get(index).map(|c| c.id.clone()).unwrap_or_default()
-    }
-
-    fn class(&self, index: usize) -> &str {
-        self.clouds.get(index).map_or("", |c| &c.class)
+    fn catalogue(&self) -> &Catalogue<StoredPoints> {
+        &self.clouds
     }
 
     /// The first `count` points, as DCP and its successors take them.
-    fn sample(&self, index: usize, count: usize, _rng: &mut ChaCha8Rng) -> Result<PointCloud, SourceError> {
-        self.cloud(index, self.get(index)?.points.iter().take(count).copied())
+    fn draw(
+        &self,
+        shape: &Entry<StoredPoints>,
+        _index: usize,
+        count: usize,
+        _rng: &mut ChaCha8Rng,
+    ) -> Result<PointCloud, SourceError> {
+        self.cloud(shape, &shape.item[..count.min(shape.item.len())])
     }
 
     /// Two disjoint random parts of the stored points; each at most half of them.
-    fn sample_two(
+    fn draw_two(
         &self,
-        index: usize,
+        shape: &Entry<StoredPoints>,
+        _index: usize,
         count: usize,
         rng: &mut ChaCha8Rng,
     ) -> Result<(PointCloud, PointCloud), SourceError> {
-        let mut points = self.get(index)?.points.clone();
+        let mut points = shape.item.clone();
         let each = count.min(points.len() / 2);
         let (drawn, _) = points.partial_shuffle(rng, 2 * each);
-        let mut drawn = drawn.iter().copied();
-        Ok((self.cloud(index, drawn.by_ref().take(each))?, self.cloud(index, drawn)?))
+        let (first, second) = drawn.split_at(each);
+        Ok((self.cloud(shape, first)?, self.cloud(shape, second)?))
     }
 }

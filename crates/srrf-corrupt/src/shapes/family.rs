@@ -9,7 +9,7 @@ use super::{
 
 /// A family of procedural shapes.
 #[non_exhaustive]
-pub struct Family {
+pub struct ShapeFamily {
     /// Its name, which is the class of its shapes.
     pub name: &'static str,
     /// Whether its shapes are symmetric about an axis.
@@ -17,22 +17,22 @@ pub struct Family {
     pub(super) draw: fn(&mut Sketch),
 }
 
-impl fmt::Debug for Family {
+impl fmt::Debug for ShapeFamily {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Family").field("name", &self.name).field("symmetric", &self.symmetric).finish()
+        f.debug_struct("ShapeFamily").field("name", &self.name).field("symmetric", &self.symmetric).finish()
     }
 }
 
-const fn family(name: &'static str, draw: fn(&mut Sketch)) -> Family {
-    Family { name, symmetric: false, draw }
+const fn family(name: &'static str, draw: fn(&mut Sketch)) -> ShapeFamily {
+    ShapeFamily { name, symmetric: false, draw }
 }
 
-const fn symmetric(name: &'static str, draw: fn(&mut Sketch)) -> Family {
-    Family { name, symmetric: true, draw }
+const fn symmetric(name: &'static str, draw: fn(&mut Sketch)) -> ShapeFamily {
+    ShapeFamily { name, symmetric: true, draw }
 }
 
 /// All families, in the order in which shapes are dealt out.
-pub static FAMILIES: &[Family] = &[
+pub static FAMILIES: &[ShapeFamily] = &[
     family("chair", seating::chair),
     family("airplane", vehicles::airplane),
     family("mug", vessels::mug),

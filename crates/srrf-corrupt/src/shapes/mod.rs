@@ -3,13 +3,15 @@
 //! Each family is a function that draws an object from parts with random proportions
 //! ([`FAMILIES`]). A new family is one function and one line in that list.
 
+use std::path::Path;
 use std::sync::OnceLock;
 
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 
-use crate::datasets::{ShapeSource, SourceError};
 use srrf_cloud::{PointCloud, UnitSphere};
+
+use crate::datasets::{Catalogue, Entry, Listed, SourceError, checked};
 
 mod family;
 mod lathe;
@@ -33,7 +35,7 @@ mod tools;
 mod vehicles;
 mod vessels;
 
-pub use family::{FAMILIES, Family};
+pub use family::{FAMILIES, ShapeFamily};
 use sketch::Sketch;
 use surface::Surface;
 
@@ -50,13 +52,19 @@ const FRAME_SEED: u64 = 0x5EED_F4A3;
 /// estimated once from 4,096 of its points, so that all samplings of a shape share one frame. For
 /// training and testing use different seeds.
 ///
-/// Shapes are drawn anew at each call and only their frames are kept, so large sets take little
+/// Shapes are drawn anew at each call and only their names and frames are kept, so large sets take little
 /// memory: 1,024 points take about 0.3 ms, and 1 ms more the first time.
 #[derive(Debug)]
 pub struct ProceduralShapes {
     seed: u64,
-    families: Vec<&'static Family>,
-    frames: Vec<OnceLock<UnitSphere>>,
+    shapes: Catalogue<Procedural>,
+}
+
+/// What a procedural shape is drawn from besides its seed and number.
+#[derive(Debug)]
+pub(crate) struct Procedural {
+    family: &'static ShapeFamily,
+    frame: OnceLock<UnitSphere>,
 }
 
 impl ProceduralShapes {
@@ -66,9 +74,9 @@ impl ProceduralShapes {
     /// [`SourceError::Families`] for an unknown name or an empty list, [`SourceError::NoShapes`] if
     /// `count` is 0.
     pub fn new(seed: u64, count: usize, families: Option<&[&str]>) -> Result<Self, SourceError> {
-        let families = match families {
+        let families: Vec<&'static ShapeFamily> = match families {
             None => FAMILIES.iter().collect(),
-            Some(names) => names.iter().map(|name| find(name)).collect::<Result<Vec<_>, _>>()?,
+            Some(names) => names.iter().map(|name| find(name)).collect::<Result<_, _>>()?,
         };
         if families.is_empty() {
             return Err(unknown_family(""));
@@ -76,59 +84,62 @@ impl ProceduralShapes {
         if count == 0 {
             return Err(SourceError::NoShapes);
         }
-        Ok(Self { seed, families, frames: (0..count).map(|_| OnceLock::new()).collect() })
+        let description = format!(
+            "procedural shapes, seed {seed}: {count} shapes of {} families",
+            families.len().min(count)
+        );
+        let shape = |index: usize| {
+            let family = families[index % families.len()];
+            let id = format!("{}_{:04}", family.name, index / families.len());
+            let item = Procedural { family, frame: OnceLock::new() };
+            Entry::new(id, family.name.to_owned(), item).symmetric(family.symmetric)
+        };
+        Ok(Self { seed, shapes: Catalogue::new(description, (0..count).map(shape).collect()) })
     }
 
-    fn family(&self, index: usize) -> &'static Family {
-        self.families[index % self.families.len()]
-    }
-
-    fn surface(&self, index: usize) -> Surface {
+    fn surface(&self, shape: &Procedural, index: usize) -> Surface {
         let mut sketch = Sketch::new(self.seed, index as u64);
-        (self.family(index).draw)(&mut sketch);
+        (shape.family.draw)(&mut sketch);
         sketch.finish()
     }
 
     /// The shape and the frame in which it has mean 0 and radius 1.
-    fn normalised(&self, index: usize) -> Result<(Surface, UnitSphere), SourceError> {
-        let frame =
-            self.frames.get(index).ok_or(SourceError::NoSuchShape { index, len: self.frames.len() })?;
-        let surface = self.surface(index);
-        let frame = match frame.get() {
+    fn normalised(
+        &self,
+        shape: &Entry<Procedural>,
+        index: usize,
+    ) -> Result<(Surface, UnitSphere), SourceError> {
+        let surface = self.surface(&shape.item, index);
+        let frame = match shape.item.frame.get() {
             Some(frame) => *frame,
             None => {
                 let mut rng = ChaCha8Rng::seed_from_u64(self.seed ^ FRAME_SEED);
                 rng.set_stream(index as u64);
-                let found = self.draw(&surface, None, index, FRAME_POINTS, &mut rng)?.to_unit_sphere().1;
-                *frame.get_or_init(|| found)
+                let found = points(&surface, None, shape, FRAME_POINTS, &mut rng)?.to_unit_sphere().1;
+                *shape.item.frame.get_or_init(|| found)
             }
         };
         Ok((surface, frame))
     }
-
-    fn draw(
-        &self,
-        surface: &Surface,
-        frame: Option<&UnitSphere>,
-        index: usize,
-        count: usize,
-        rng: &mut ChaCha8Rng,
-    ) -> Result<PointCloud, SourceError> {
-        let points = (0..count)
-            .filter_map(|_| {
-                let point = surface.sample(rng)?.into();
-                Some(frame.map_or(point, |frame| frame.apply(&point)))
-            })
-            .collect();
-        PointCloud::new(points).map_err(|source| SourceError::Shape {
-            path: "procedural shapes".into(),
-            shape: self.id(index),
-            source,
-        })
-    }
 }
 
-fn find(name: &str) -> Result<&'static Family, SourceError> {
+fn points(
+    surface: &Surface,
+    frame: Option<&UnitSphere>,
+    shape: &Entry<Procedural>,
+    count: usize,
+    rng: &mut ChaCha8Rng,
+) -> Result<PointCloud, SourceError> {
+    let points = (0..count)
+        .filter_map(|_| {
+            let point = surface.sample(rng)?.into();
+            Some(frame.map_or(point, |frame| frame.apply(&point)))
+        })
+        .collect();
+    checked(points, Path::new("procedural shapes"), shape.id())
+}
+
+fn find(name: &str) -> Result<&'static ShapeFamily, SourceError> {
     FAMILIES.iter().find(|family| family.name == name).ok_or_else(|| unknown_family(name))
 }
 
@@ -137,46 +148,34 @@ fn unknown_family(name: &str) -> SourceError {
     SourceError::Families { name: name.to_owned(), known }
 }
 
-impl ShapeSource for ProceduralShapes {
-    fn len(&self) -> usize {
-        self.frames.len()
+impl Listed for ProceduralShapes {
+    type Item = Procedural;
+
+    fn catalogue(&self) -> &Catalogue<Procedural> {
+        &self.shapes
     }
 
-    fn description(&self) -> String {
-        format!(
-            "procedural shapes, seed {}: {} shapes of {} families",
-            self.seed,
-            self.frames.len(),
-            self.families.len().min(self.frames.len())
-        )
-    }
-
-    fn id(&self, index: usize) -> String {
-        format!("{}_{:04}", self.family(index).name, index / self.families.len())
-    }
-
-    fn class(&self, index: usize) -> &str {
-        self.family(index).name
-    }
-
-    fn is_symmetric(&self, index: usize) -> bool {
-        self.family(index).symmetric
-    }
-
-    fn sample(&self, index: usize, count: usize, rng: &mut ChaCha8Rng) -> Result<PointCloud, SourceError> {
-        let (surface, frame) = self.normalised(index)?;
-        self.draw(&surface, Some(&frame), index, count, rng)
-    }
-
-    fn sample_two(
+    fn draw(
         &self,
+        shape: &Entry<Procedural>,
+        index: usize,
+        count: usize,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<PointCloud, SourceError> {
+        let (surface, frame) = self.normalised(shape, index)?;
+        points(&surface, Some(&frame), shape, count, rng)
+    }
+
+    fn draw_two(
+        &self,
+        shape: &Entry<Procedural>,
         index: usize,
         count: usize,
         rng: &mut ChaCha8Rng,
     ) -> Result<(PointCloud, PointCloud), SourceError> {
-        let (surface, frame) = self.normalised(index)?;
-        let first = self.draw(&surface, Some(&frame), index, count, rng)?;
-        Ok((first, self.draw(&surface, Some(&frame), index, count, rng)?))
+        let (surface, frame) = self.normalised(shape, index)?;
+        let first = points(&surface, Some(&frame), shape, count, rng)?;
+        Ok((first, points(&surface, Some(&frame), shape, count, rng)?))
     }
 }
 

@@ -1,6 +1,6 @@
 //! The tables, made from the summaries.
 
-use srrf_corrupt::CorruptionKind;
+use srrf_corrupt::{CorruptionKind, Family};
 
 use super::paper;
 use super::plan::MIDDLE;
@@ -11,35 +11,21 @@ use crate::metrics::Scores;
 use crate::quantities::{QUANTITIES, Quantity};
 use crate::summary::{SeverityKey, Summary, SummaryRow};
 
-/// The corruptions of the paper's tables 1 to 3; upsampling, which it left out, stands with the noise.
-const PAPER_TABLES: [(&str, &str, &[CorruptionKind]); 3] = [
-    (
-        "table1",
-        "Table 1: density",
-        &[CorruptionKind::DensityInc, CorruptionKind::DensityDec, CorruptionKind::Cutout],
-    ),
-    (
-        "table2",
-        "Table 2: noise",
-        &[
-            CorruptionKind::Uniform,
-            CorruptionKind::Gaussian,
-            CorruptionKind::Impulse,
-            CorruptionKind::Background,
-            CorruptionKind::Upsampling,
-        ],
-    ),
-    (
-        "table3",
-        "Table 3: transformation",
-        &[
-            CorruptionKind::Shear,
-            CorruptionKind::Distortion,
-            CorruptionKind::DistortionRbf,
-            CorruptionKind::DistortionRbfInv,
-        ],
-    ),
+/// The paper's tables 1 to 3, one for each family. Upsampling, which it left out, stands with the noise.
+const PAPER_TABLES: [(&str, &str, Family); 3] = [
+    ("table1", "Table 1: density", Family::Density),
+    ("table2", "Table 2: noise", Family::Noise),
+    ("table3", "Table 3: transformation", Family::Transformation),
 ];
+
+/// The corruptions of a family in the order of the paper's table, then those that it left out.
+fn in_the_order_of_the_paper(family: Family) -> Vec<&'static str> {
+    let mut names: Vec<&'static str> = CorruptionKind::of_family(family).map(CorruptionKind::name).collect();
+    names.sort_by_key(|name| {
+        paper::rows().iter().position(|row| row.corruption == *name).unwrap_or(usize::MAX)
+    });
+    names
+}
 
 const PAPER_HEAD: [&str; 14] = [
     "corruption",
@@ -111,7 +97,7 @@ pub(crate) fn paper_tables(summary: &Summary, suffix: &str) -> Vec<Sheet> {
     let mut sheets = Vec::new();
     let key = |name: &str| format!("{name}{suffix}");
     let clean = ("clean", "Clean pairs", vec!["clean"]);
-    let tables = PAPER_TABLES.iter().map(|(k, t, kinds)| (*k, *t, kinds.iter().map(|c| c.name()).collect()));
+    let tables = PAPER_TABLES.iter().map(|(k, t, family)| (*k, *t, in_the_order_of_the_paper(*family)));
     for (name, title, corruptions) in std::iter::once(clean).chain(tables) {
         let note = if name == "clean" { CLEAN_NOTE } else { PAPER_NOTE };
         let mut sheet = Sheet::new(&key(name), title, note, &PAPER_HEAD);

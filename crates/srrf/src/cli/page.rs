@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::{Args, ValueEnum};
 use srrf::Outcome;
-use srrf_cloud::Rigid;
+use srrf_cloud::{RIGHT_IN_WORDS, Rigid};
 use srrf_view::{Number, Page, Pair, Pose, Up};
 
 use super::files::Input;
@@ -70,9 +70,10 @@ pub fn of_outcome(
     let mut pair = args
         .pair(source, target)
         .pose(Pose::new("result", outcome.target_from_source))
-        .number(Number::text("Verdict", format!("{verdict} ({})", percent(outcome.probability))).help(
-            "probability that the pose is within 5° and a tenth of the target's radius of the true one",
-        ))
+        .number(
+            Number::text("Verdict", format!("{verdict} ({})", percent(outcome.probability)))
+                .help(format!("probability that the pose is {RIGHT_IN_WORDS} of the true one")),
+        )
         .number(Number::new("Rotation", angle).unit("°"))
         .number(Number::text("Source points near the target", percent(e.fitness)).help(format!(
             "{} of {} asked, within {:.4}",

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use nalgebra::Vector3;
 use srrf::Outcome;
+use srrf_cloud::RIGHT_IN_WORDS;
 
 use super::files::Input;
 use super::say::{count, length, points, vector};
@@ -32,10 +33,7 @@ pub fn text(outcome: &Outcome, source: &Input, target: &Input, seconds: f64) -> 
     let verdict = if outcome.abstain { "abstain: do not rely on it" } else { "probably right" };
     line(
         "verdict",
-        &format!(
-            "{verdict}; {:.0} % that it is right (within 5° and a tenth of the target's radius)",
-            100.0 * outcome.probability
-        ),
+        &format!("{verdict}; {:.0} % that it is right ({RIGHT_IN_WORDS})", 100.0 * outcome.probability),
     );
     evidence(outcome, &mut line);
     line("time", &times(outcome, seconds));

@@ -1,95 +1,25 @@
 //! [`PairSynthesizer`]: corrupt, normalise, resample, pose, shuffle.
 
-use crate::datasets::{ShapeSource, SourceError};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, seq::SliceRandom};
-use srrf_cloud::{CloudError, PointCloud, Rigid};
+use srrf_cloud::{PointCloud, Rigid};
 
-use super::pose::draw;
-use super::{Corrupt, InvalidConfig, Normalize, PairConfig, PoseDraw, Purpose, Sampling, Stream};
-use crate::{
-    CorruptError, Corrupted, Corruption, CorruptionKind, DensityInc, Mixture, Severity, box_normalize,
-};
-
-/// Two clouds of one shape, and the pose between them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Pair {
-    /// Shape `[points, 3]`, in the shape's canonical frame.
-    pub source: PointCloud,
-    /// Shape `[points, 3]`, posed by [`Pair::target_from_source`].
-    pub target: PointCloud,
-    /// The pose that was applied: exact, up to what the corruptions moved. With
-    /// [`Normalize::AfterPose`] only its rotation means something.
-    pub target_from_source: Rigid,
-    /// For each source point the base point that it is, `None` for points that a corruption
-    /// added. Absent for independent sampling, or where the config does not keep it.
-    pub source_origin: Option<Vec<Option<u32>>>,
-    /// The same for the target. Points with equal entries correspond.
-    pub target_origin: Option<Vec<Option<u32>>>,
-    /// What was done to the clouds; `None` if they are clean, or corrupted by a [`Mixture`].
-    pub corruption: Option<(CorruptionKind, Severity)>,
-    /// Name of the shape.
-    pub id: String,
-    /// Name of its category, empty if unknown.
-    pub class: String,
-    /// Whether its class is symmetric about an axis, so that no pose is unique.
-    pub symmetric: bool,
-}
-
-/// What a shape is called.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Label {
-    /// Name of the shape.
-    pub id: String,
-    /// Name of its category.
-    pub class: String,
-    /// Whether the category is symmetric about an axis.
-    pub symmetric: bool,
-}
-
-/// The clean points from which a pair is made, canonical frame.
-#[derive(Debug, Clone, Copy)]
-pub enum Bases<'a> {
-    /// Source and target are made from the same points.
-    Shared(&'a PointCloud),
-    /// Source and target (in this order) are made from points of their own.
-    Independent(&'a PointCloud, &'a PointCloud),
-}
-
-/// Why a pair could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum PairError {
-    /// The config makes no sense.
-    #[error("pair configuration: {0}")]
-    Config(#[from] InvalidConfig),
-    /// The shape could not be had.
-    #[error("{0}")]
-    Shape(#[from] SourceError),
-    /// The shape could not be corrupted.
-    #[error("shape {id}: {source}")]
-    Corrupt {
-        /// Name of the shape.
-        id: String,
-        /// Why.
-        source: CorruptError,
-    },
-    /// The pair has coordinates that are not finite, as huge input coordinates may give.
-    #[error("shape {id}: {source}")]
-    Cloud {
-        /// Name of the shape.
-        id: String,
-        /// Which.
-        source: CloudError,
-    },
-}
+use super::config::{Corrupt, InvalidConfig, Normalize, PairConfig, Sampling};
+use super::pair::{Bases, Pair, PairError};
+use super::pose::{PoseDraw, dcp_test_pose, draw};
+use super::stream::{Purpose, Stream};
+use crate::corruption::{CorruptError, Corrupted, Corruption};
+use crate::corruptions::CorruptionKind;
+use crate::datasets::{Label, ShapeSource};
+use crate::kind::corruption;
+use crate::normalize::box_normalize;
+use crate::severity::Severity;
 
 /// What hits a cloud.
 #[derive(Clone, Copy)]
 struct Hit<'a> {
     corruption: &'a dyn Corruption,
     severity: Severity,
-    /// Whether box normalisation, if the config asks for it, follows.
-    boxed: bool,
 }
 
 /// Makes registration pairs by one [`PairConfig`]. Cheap; share it between threads.
@@ -128,55 +58,37 @@ impl PairSynthesizer {
         pose: PoseDraw,
         stream: Stream,
     ) -> Result<Pair, PairError> {
-        // ModelNet40-C's density_inc thins a cloud of twice the points.
-        let thinned = self.config.variants.density_inc == DensityInc::ModelNet40C
-            && matches!(corruption, Some((CorruptionKind::DensityInc, _)));
-        let count = if thinned { 2 * self.config.points } else { self.config.points };
-        self.sampled(shapes, index, count, stream, |bases, label| {
-            self.pair_from_bases(bases, label, corruption, pose, stream)
-        })
+        let built = self.built(corruption);
+        let hit = built.as_ref().map(|(corruption, severity)| (&**corruption, *severity));
+        Ok(Pair { corruption, ..self.pair_with(shapes, index, hit, pose, stream)? })
     }
 
-    /// As [`PairSynthesizer::pair`], with a mixture of corruptions. Box normalisation leaves mixtures
-    /// alone.
+    /// As [`PairSynthesizer::pair`], with any [`Corruption`]: a [`Mixture`](crate::Mixture), or one that is not in
+    /// the registry.
     ///
     /// # Errors
     /// [`PairError`] when the shape cannot be read or corrupted.
-    pub fn mixed_pair(
+    pub fn pair_with(
         &self,
         shapes: &dyn ShapeSource,
         index: usize,
-        (mixture, severity): (Mixture, Severity),
+        corruption: Option<(&dyn Corruption, Severity)>,
         pose: PoseDraw,
         stream: Stream,
     ) -> Result<Pair, PairError> {
-        let corruption = mixture.corruption(&self.config.variants);
-        let hit = Hit { corruption: &*corruption, severity, boxed: false };
-        self.sampled(shapes, index, self.config.points, stream, |bases, label| {
-            self.make(bases, label, Some(hit), pose, stream)
-        })
-    }
-
-    /// Draws `count` base points of shape `index` for `make`.
-    fn sampled(
-        &self,
-        shapes: &dyn ShapeSource,
-        index: usize,
-        count: usize,
-        stream: Stream,
-        make: impl FnOnce(Bases<'_>, Label) -> Result<Pair, PairError>,
-    ) -> Result<Pair, PairError> {
-        let label = Label {
-            id: shapes.id(index),
-            class: shapes.class(index).to_owned(),
-            symmetric: shapes.is_symmetric(index),
-        };
+        let points = self.config.points;
+        let count = corruption.map_or(points, |(corruption, _)| corruption.clean_points(points));
+        let label = shapes.label(index);
         let mut rng = stream.rng(Purpose::Base);
+        let hit = corruption.map(|(corruption, severity)| Hit { corruption, severity });
         match self.config.sampling {
-            Sampling::Shared => make(Bases::Shared(&shapes.sample(index, count, &mut rng)?), label),
+            Sampling::Shared => {
+                let base = shapes.sample(index, count, &mut rng)?;
+                self.make(Bases::Shared(&base), label, hit, pose, stream)
+            }
             Sampling::Independent => {
                 let (source, target) = shapes.sample_two(index, count, &mut rng)?;
-                make(Bases::Independent(&source, &target), label)
+                self.make(Bases::Independent(&source, &target), label, hit, pose, stream)
             }
         }
     }
@@ -193,14 +105,16 @@ impl PairSynthesizer {
         pose: PoseDraw,
         stream: Stream,
     ) -> Result<Pair, PairError> {
-        let built = corruption
-            .map(|(kind, severity)| (crate::corruption(kind, &self.config.variants), kind, severity));
-        let hit = built.as_ref().map(|(corruption, kind, severity)| Hit {
-            corruption: &**corruption,
-            severity: *severity,
-            boxed: kind.is_box_normalized(),
-        });
+        let built = self.built(corruption);
+        let hit = built
+            .as_ref()
+            .map(|(corruption, severity)| Hit { corruption: &**corruption, severity: *severity });
         Ok(Pair { corruption, ..self.make(bases, label, hit, pose, stream)? })
+    }
+
+    /// The corruption of that name, in the readings of the config.
+    fn built(&self, named: Option<(CorruptionKind, Severity)>) -> Option<(Box<dyn Corruption>, Severity)> {
+        named.map(|(kind, severity)| (corruption(kind, &self.config.variants), severity))
     }
 
     /// Corrupts, resamples, poses and shuffles.
@@ -219,7 +133,7 @@ impl PairSynthesizer {
         };
         let target_from_source = match pose {
             PoseDraw::Seeded => draw(config.rotation, config.translation, &mut stream.rng(Purpose::Pose)),
-            PoseDraw::DcpTest(item) => super::dcp_test_pose(item),
+            PoseDraw::DcpTest(item) => dcp_test_pose(item),
             PoseDraw::Given(pose) => pose,
         };
         let side = |base: &PointCloud, hit: bool, pose: &Rigid, corrupting, resampling| {
@@ -228,7 +142,7 @@ impl PairSynthesizer {
             let cloud = self
                 .corrupted(base, hit, &mut rng)
                 .map_err(|source| PairError::Corrupt { id: label.id.clone(), source })?;
-            let boxed = hit.is_some_and(|hit| hit.boxed);
+            let boxed = hit.is_some_and(|hit| hit.corruption.is_box_normalized());
             let mut cloud = resample(cloud, config.points, &mut stream.rng(resampling));
             cloud.points.iter_mut().for_each(|p| *p = pose.apply(p));
             if boxed && config.normalize == Normalize::AfterPose {
@@ -273,11 +187,11 @@ impl PairSynthesizer {
         hit: Option<Hit<'_>>,
         rng: &mut ChaCha8Rng,
     ) -> Result<Corrupted, CorruptError> {
-        let Some(Hit { corruption, severity, boxed }) = hit else {
+        let Some(Hit { corruption, severity }) = hit else {
             return Ok(Corrupted::moved(base.points().to_vec()));
         };
         let mut cloud = corruption.apply(base.points(), severity, rng)?;
-        if boxed && self.config.normalize == Normalize::Canonical {
+        if corruption.is_box_normalized() && self.config.normalize == Normalize::Canonical {
             box_normalize(&mut cloud.points);
         }
         Ok(cloud)

@@ -8,7 +8,7 @@ use rand_distr::StandardNormal;
 use rand_mt::Mt;
 use srrf_cloud::{EulerXyz, Rigid};
 
-use super::RotationRange;
+use super::config::RotationRange;
 
 /// Where the pose of a pair comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]

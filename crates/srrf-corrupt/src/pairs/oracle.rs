@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use srrf_cloud::Rigid;
 
-use super::Pair;
+use super::pair::Pair;
 
 /// The least-squares pose over the base points that are in both clouds of `pair`: the floor for
 /// any method that fits correspondences, since corruptions such as `shear` move even perfect ones.
