@@ -22,6 +22,7 @@
 //! ```
 
 mod card;
+pub mod cli;
 mod corruption;
 pub mod corruptions;
 pub mod crop;

@@ -251,6 +251,6 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         let error = Cache::open(&file.path().join("cache"), "flex").unwrap_err();
         assert!(error.to_string().contains("answers.jsonl"), "{error}");
-        assert_eq!(error.exit_code(), 2);
+        assert!(error.is_usage());
     }
 }

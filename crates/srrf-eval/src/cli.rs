@@ -3,9 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use serde::de::DeserializeOwned;
-use srrf_corrupt::{CorruptionKind, PairConfig, RotationRange, Severity, Variants};
+use srrf_args::Scripts;
+use srrf_args::flags::{MOST_POINTS, MOST_SHAPES, MOST_THREADS, Threads, help, value};
+use srrf_args::numbers::{entry, real, whole};
+use srrf_corrupt::cli::ReadingArgs;
+use srrf_corrupt::{CorruptionKind, PairConfig, RotationRange, Severity};
 
 use crate::EvalError;
 use crate::TablesOptions;
@@ -25,17 +29,21 @@ pub struct Options {
     #[command(subcommand)]
     pub command: Option<Command>,
 
-    /// ModelNet40, or a folder of shapes; its test split is used [default: $SRRF_DATA, or built-in
-    /// shapes]
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = value::PATH, help = help::DATA, long_help = format!("{}\n\n{TEST_SPLIT}", help::DATA))]
     pub data: Option<PathBuf>,
 
-    /// Number of shapes, spread evenly over the data; each is scored in every group
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_SHAPES)]
+    #[arg(
+        long,
+        value_name = value::NUMBER,
+        default_value_t = DEFAULT_SHAPES,
+        value_parser = whole(1, MOST_SHAPES),
+        allow_negative_numbers = true,
+        help = help::SHAPES
+    )]
     pub shapes: usize,
 
     /// Corruptions, and `clean` [default: clean and all twelve]
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = value::NAMES, value_delimiter = ',', value_parser = entry::<String>)]
     pub corruptions: Vec<String>,
 
     /// Only clean pairs
@@ -43,40 +51,57 @@ pub struct Options {
     pub clean_only: bool,
 
     /// Severities, 1 to 5 [default: all]
-    #[arg(long, value_name = "NUMBERS", value_delimiter = ',')]
-    pub severities: Vec<u8>,
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',', value_parser = entry::<Severity>)]
+    pub severities: Vec<Severity>,
 
-    /// Each shape at one severity only, the severities in turn: many shapes in a fraction of the time
-    #[arg(long)]
+    #[arg(long, help = help::SPREAD, long_help = format!("{}: many shapes in a fraction of the time", help::SPREAD))]
     pub spread: bool,
 
-    /// Rows of the tables [default: identity, icp, oracle and the network with its branches]
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(
+        long,
+        value_name = value::NAMES,
+        value_delimiter = ',',
+        value_parser = entry::<String>,
+        help = help::METHODS,
+        long_help = format!("{}\n\n[default: identity, icp, oracle and the network with its branches]", help::METHODS)
+    )]
     pub methods: Vec<String>,
 
-    /// Seed of the pairs: corruptions, poses and order of the points
-    #[arg(long, value_name = "S", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = value::NUMBER,
+        default_value_t = 1,
+        value_parser = whole(0, u64::MAX),
+        allow_negative_numbers = true,
+        help = help::SEED
+    )]
     pub seed: u64,
 
-    /// Where the network runs: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda`, `libtorch` where built in
-    #[arg(long, value_name = "NAME", default_value = "flex")]
+    #[arg(long, value_name = value::DEVICE, default_value = "flex", help = help::DEVICE)]
     pub device: String,
 
-    /// Print at the end what time each method, and each stage of the network in it, took, over all threads
-    #[arg(long)]
+    #[arg(long, help = help::PROFILE)]
     pub profile: bool,
 
-    /// Trained weights of srrf: a file, or `srrf`, `srrf-small` or `srrf-shapes` in the program [default:
-    /// srrf]; or METHOD=PATH for those of a learned baseline. May be given more than once
-    #[arg(long, value_name = "PATH")]
+    #[arg(
+        long,
+        value_name = value::WEIGHTS,
+        help = help::WEIGHTS,
+        long_help = format!("{}\n\n{OF_BASELINES}", help::WEIGHTS)
+    )]
     pub weights: Vec<String>,
 
-    /// Worker threads [default: all cores]. Results do not depend on it
-    #[arg(long, value_name = "N")]
+    #[arg(
+        long,
+        value_name = value::NUMBER,
+        value_parser = whole(1, MOST_THREADS),
+        allow_negative_numbers = true,
+        help = help::THREADS
+    )]
     pub threads: Option<usize>,
 
     /// Folder for the report
-    #[arg(long, value_name = "DIR", default_value = "report")]
+    #[arg(short, long = "output", alias = "out", value_name = value::FOLDER, default_value = "report")]
     pub out: PathBuf,
 
     /// Score the pairs of this file instead of making pairs
@@ -92,8 +117,14 @@ pub struct Options {
     #[arg(long, value_name = "FILE")]
     pub transforms: Vec<PathBuf>,
 
-    /// Points of each cloud
-    #[arg(long, value_name = "N", default_value_t = 1024)]
+    #[arg(
+        long,
+        value_name = value::NUMBER,
+        default_value_t = 1024,
+        value_parser = whole(3, MOST_POINTS),
+        allow_negative_numbers = true,
+        help = help::POINTS
+    )]
     pub points: usize,
 
     /// Whether source and target start from the same points of the shape
@@ -112,18 +143,27 @@ pub struct Options {
     #[arg(long, value_name = "WHEN", value_parser = ["none", "canonical", "after_pose"], default_value = "none")]
     pub normalize: String,
 
-    /// Range of the rotation: largest Euler angle in degrees, `so3` for all rotations, or `dcp` for
-    /// the test poses of DCP (which fix the translation too)
-    #[arg(long, value_name = "RANGE", default_value = "45")]
+    #[arg(
+        long,
+        value_name = value::ROTATION,
+        default_value = "45",
+        help = help::ROTATION,
+        long_help = format!("{}\n\n{OF_POSES}", help::ROTATION)
+    )]
     pub rotation: String,
 
     /// Largest translation along each axis
-    #[arg(long, value_name = "LENGTH", default_value_t = 0.5)]
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        default_value_t = 0.5,
+        value_parser = real(0.0, 1e6),
+        allow_negative_numbers = true
+    )]
     pub translation: f64,
 
-    /// Reading of the corruptions where the paper's text and the reference code differ
-    #[arg(long, value_name = "WHICH", value_parser = ["paper", "modelnet40_c"], default_value = "paper")]
-    pub variants: String,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
 }
 
 /// What the program does beside scoring one protocol.
@@ -131,7 +171,26 @@ pub struct Options {
 pub enum Command {
     /// All tables and figures of the paper and of our ablations, and one page to look at them
     Tables(Box<TablesOptions>),
+    /// Completions and manual pages
+    #[command(flatten)]
+    Scripts(Scripts),
 }
+
+/// The program's arguments, for tests that compare the programs.
+pub fn command() -> clap::Command {
+    Options::command()
+}
+
+/// More about `--data`.
+pub(crate) const TEST_SPLIT: &str = "The test split is used. Without data, built-in shapes are made";
+
+/// More about `--weights`.
+pub(crate) const OF_BASELINES: &str =
+    "METHOD=FILE for those of a learned baseline. May be given more than once";
+
+/// More about `--rotation`.
+const OF_POSES: &str = "Here degrees are the largest of each Euler angle; `dcp` takes the test poses of DCP, which fix \
+     the translation too";
 
 const PAIR_OPTIONS: [&str; 13] = [
     "data",
@@ -158,7 +217,11 @@ Examples:
   srrf-eval --export-pairs pairs.npz            then run another tool on them, and
   srrf-eval --pairs pairs.npz --transforms tool.npz
 
-Exit code: 0 done, 1 failure, 2 bad usage or input.";
+Exit codes:
+  0    done
+  1    failure, such as a report that could not be written
+  2    bad usage or input
+  130  interrupted; `tables` goes on where it stopped";
 
 impl Options {
     /// The pairs that the options ask for.
@@ -166,9 +229,6 @@ impl Options {
     /// # Errors
     /// [`EvalError`] names the option that cannot be used.
     pub fn protocol(&self) -> Result<Protocol, EvalError> {
-        if self.shapes == 0 {
-            return Err(EvalError::Usage("--shapes 0: at least one shape is needed".into()));
-        }
         let named = |name: &String| (name != CLEAN).then(|| name.parse::<CorruptionKind>());
         let mut corruptions: Vec<CorruptionKind> =
             self.corruptions.iter().filter_map(named).collect::<Result<_, _>>()?;
@@ -177,8 +237,7 @@ impl Options {
         }
         corruptions.sort_unstable();
         corruptions.dedup();
-        let mut severities: Vec<Severity> =
-            self.severities.iter().map(|&s| Severity::try_from(s)).collect::<Result<_, _>>()?;
+        let mut severities = self.severities.clone();
         if severities.is_empty() {
             severities = Severity::ALL.to_vec();
         }
@@ -220,7 +279,7 @@ impl Options {
             translation: self.translation,
             points: self.points,
             keep_correspondence: true,
-            variants: if self.variants == "paper" { Variants::paper() } else { Variants::modelnet40_c() },
+            variants: self.reading.variants(),
         })
     }
 
@@ -230,15 +289,8 @@ impl Options {
     }
 
     /// Number of worker threads.
-    ///
-    /// # Errors
-    /// [`EvalError::Usage`] for 0.
-    pub fn thread_count(&self) -> Result<usize, EvalError> {
-        match self.threads {
-            Some(0) => Err(EvalError::Usage("--threads 0: at least one thread is needed".into())),
-            Some(threads) => Ok(threads),
-            None => Ok(std::thread::available_parallelism().map_or(1, usize::from)),
-        }
+    pub fn thread_count(&self) -> usize {
+        Threads { threads: self.threads }.count()
     }
 }
 
@@ -258,8 +310,7 @@ fn switch<T: DeserializeOwned>(option: &str, name: &str) -> Result<T, EvalError>
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-    use srrf_corrupt::{Corrupt, Normalize, Sampling};
+    use srrf_corrupt::{Corrupt, Normalize, Sampling, Variants};
 
     use super::*;
 
@@ -286,7 +337,7 @@ mod tests {
         let protocol = parse(
             "--corruptions cutout,gaussian,cutout --severities 5,1 --shapes 9 --seed 4 --points 200 \
              --independent --corrupt target --normalize after_pose --rotation so3 --translation 0.25 \
-             --variants modelnet40_c",
+             --reading modelnet40_c",
         )
         .protocol()
         .unwrap();
@@ -320,9 +371,23 @@ mod tests {
         let message = |arguments: &str| parse(arguments).protocol().unwrap_err().to_string();
         assert!(message("--corruptions rain").contains("`rain`"));
         assert!(message("--corruptions rain").contains("or `clean`"));
-        assert!(message("--severities 9").contains("severity 9"));
-        assert!(message("--shapes 0").contains("at least one shape"));
         assert!(message("--rotation far").contains("--rotation far"));
-        assert!(parse("--threads 0").thread_count().is_err());
+        let refused = |arguments: &str| {
+            let words = ["srrf-eval"].into_iter().chain(arguments.split_whitespace());
+            Options::try_parse_from(words).unwrap_err().to_string()
+        };
+        for (arguments, parts) in [
+            ("--severities 9", ["--severities", "severity 9"]),
+            ("--severities 3;5", ["--severities", "apart by commas: 3,5"]),
+            ("--corruptions cutout;shear", ["--corruptions", "apart by commas: cutout,shear"]),
+            ("--shapes 0", ["--shapes <N>", "from 1 to"]),
+            ("--threads 0", ["--threads <N>", "from 1 to 4,096"]),
+            ("--points 2", ["--points <N>", "from 3 to"]),
+            ("--seed -1", ["--seed <N>", "from 0 to"]),
+            ("--translation nan", ["--translation <LENGTH>", "from 0 to"]),
+        ] {
+            let message = refused(arguments);
+            assert!(parts.iter().all(|part| message.contains(part)), "{message}");
+        }
     }
 }

@@ -136,13 +136,16 @@ pub enum EvalError {
     Threads(#[from] rayon::ThreadPoolBuildError),
 }
 
+/// Usage and input are the user's to put right; the rest is a failure.
+impl From<EvalError> for srrf_args::Failure {
+    fn from(error: EvalError) -> Self {
+        if error.is_usage() { Self::input(error) } else { Self::other(error) }
+    }
+}
+
 impl EvalError {
-    /// The exit code of a program that ends with this error: 2 for what the user can put right (usage
-    /// and input), 1 for failures.
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Output { .. } | Self::Picture { .. } | Self::Metric { .. } | Self::Threads(_) => 1,
-            _ => 2,
-        }
+    /// Whether it is what the user can put right: usage and input.
+    pub fn is_usage(&self) -> bool {
+        !matches!(self, Self::Output { .. } | Self::Picture { .. } | Self::Metric { .. } | Self::Threads(_))
     }
 }

@@ -37,7 +37,7 @@ mod transforms;
 pub use arrays::{Array, ArrayError};
 pub use cache::Cache;
 pub use chamfer::{CleanShape, SkeletonAgreement};
-pub use cli::{Command, Options};
+pub use cli::{Command, Options, command};
 pub use error::EvalError;
 pub use methods::{METHODS, Method, MethodContext, MethodEntry, ORACLE, Selection, all_rows, select};
 pub use metrics::{MetricError, PairError, RECALL_ROTATION_DEG, RECALL_TRANSLATION, Scores};

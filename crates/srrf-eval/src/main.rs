@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
+use srrf_args::{interrupt, run_program};
 use srrf_cloud::profile;
 use srrf_eval::tables::{self, Progress};
 use srrf_eval::{
@@ -16,22 +16,22 @@ use srrf_eval::{
 
 fn main() -> ExitCode {
     srrf_model::keep_freed_memory();
-    let options = Options::parse();
-    let done = match &options.command {
-        Some(Command::Tables(tables)) => make_tables(tables),
-        None => run(&options),
-    };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            let _ = writeln!(io::stderr(), "error: {error}");
-            ExitCode::from(error.exit_code())
+    run_program(|options: Options| {
+        interrupt::install()?;
+        match &options.command {
+            Some(Command::Scripts(scripts)) => return scripts.run(srrf_eval::command()),
+            Some(Command::Tables(tables)) => {
+                interrupt::advise("; the same command goes on where this one stopped");
+                make_tables(tables)?;
+            }
+            None => run(&options)?,
         }
-    }
+        Ok(ExitCode::SUCCESS)
+    })
 }
 
 fn run(options: &Options) -> Result<(), EvalError> {
-    let (start, threads) = (Instant::now(), options.thread_count()?);
+    let (start, threads) = (Instant::now(), options.thread_count());
     if options.profile {
         profile::start();
     }

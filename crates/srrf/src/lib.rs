@@ -22,7 +22,12 @@
 //! Coordinates go in and come out in `f64`, in the unit and the frame of the input. Inside, both clouds
 //! are centred, so that map coordinates keep their last millimetre.
 
+// The program's own modules speak of the library by its name, as any program does.
+extern crate self as srrf;
+
 mod benchmark;
+#[doc(hidden)]
+pub mod cli;
 mod frame;
 mod network;
 mod options;

@@ -25,6 +25,8 @@ use std::collections::BTreeMap;
 
 pub use options::TablesOptions;
 
+use srrf_args::flags::Threads;
+
 use crate::cache::Cache;
 use crate::cli::weights_by_method;
 use crate::methods::{METHODS, Method, MethodContext};
@@ -95,7 +97,6 @@ pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, E
         say(Progress::Line(&format!("left out: {name}: {reason}")));
     }
     let shapes = match options.shapes {
-        Some(0) => return Err(EvalError::Usage("--shapes 0: at least one shape is needed".into())),
         Some(shapes) => shapes,
         None => data::open(options.data.as_deref(), BUILT_IN_SHAPES)?.len(),
     };
@@ -151,11 +152,7 @@ impl Stage<'_> {
         say: Listener<'_>,
     ) -> Result<Measured, EvalError> {
         say(Progress::Start(title, pairs.groups().iter().map(|g| g.pairs).sum()));
-        let threads = match self.options.threads {
-            Some(0) => return Err(EvalError::Usage("--threads 0: at least one thread is needed".into())),
-            Some(threads) => threads,
-            None => std::thread::available_parallelism().map_or(1, usize::from),
-        };
+        let threads = Threads { threads: self.options.threads }.count();
         let run = Run { pairs, methods, transforms: Vec::new(), rows, threads, cache: Some(self.cache) };
         let outcome = run.execute(&mut |done, group| say(Progress::Done(done, group)))?;
         Ok(Measured { summary: Summary::of(&outcome)?, outcome, data: pairs.description() })

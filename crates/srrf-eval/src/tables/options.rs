@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
+use srrf_args::flags::{MOST_POINTS, MOST_SHAPES, MOST_THREADS, help, value};
+use srrf_args::numbers::{entry, whole};
 
 use super::cast::model_or;
-use crate::cli::weights_by_method;
+use crate::cli::{OF_BASELINES, TEST_SPLIT, weights_by_method};
 
 /// Makes all tables and figures of the report: the paper's tables 1 to 5 with its own numbers beside
 /// ours, the ablations that need no training, severity curves, and one page to look at it all.
@@ -16,33 +18,42 @@ use crate::cli::weights_by_method;
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct TablesOptions {
-    /// ModelNet40, or a folder of shapes; its test split is used [default: $SRRF_DATA, or built-in
-    /// shapes]
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = value::PATH, help = help::DATA, long_help = format!("{}\n\n{TEST_SPLIT}", help::DATA))]
     pub data: Option<PathBuf>,
 
-    /// Number of shapes, spread evenly over the data [default: all, or 20 built-in shapes]. All of
-    /// ModelNet40's test split takes half a day on two idle cores
-    #[arg(long, value_name = "N")]
+    #[arg(
+        long,
+        value_name = value::NUMBER,
+        value_parser = whole(1, MOST_SHAPES),
+        allow_negative_numbers = true,
+        help = help::SHAPES,
+        long_help = format!("{}\n\n{ALL_SHAPES}", help::SHAPES)
+    )]
     pub shapes: Option<usize>,
 
-    /// Each shape of the tables of models at one severity only, the severities in turn: five times the shapes in the
-    /// same time. Curves, ablations and tables 4 and 5, which compare the same shapes, take a fifth of them
-    #[arg(long)]
+    #[arg(long, help = help::SPREAD, long_help = format!("{}\n\n{SPREAD_TABLES}", help::SPREAD))]
     pub spread: bool,
 
-    /// Rows of the tables [default: the paper's methods, and ours]. Those without weights are left out,
-    /// and the report says so
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(
+        long,
+        value_name = value::NAMES,
+        value_delimiter = ',',
+        value_parser = entry::<String>,
+        help = help::METHODS,
+        long_help = format!("{}\n\n{ROWS_LEFT_OUT}", help::METHODS)
+    )]
     pub methods: Vec<String>,
 
     /// Parts to make [default: all]
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PARTS)]
+    #[arg(long, value_name = value::NAMES, value_delimiter = ',', value_parser = PARTS)]
     pub parts: Vec<String>,
 
-    /// Trained weights of srrf: a file, or the name of a model in the program [default: srrf]; or
-    /// METHOD=PATH for those of a learned baseline. May be given more than once
-    #[arg(long, value_name = "PATH")]
+    #[arg(
+        long,
+        value_name = value::WEIGHTS,
+        help = help::WEIGHTS,
+        long_help = format!("{}\n\n{OF_BASELINES}", help::WEIGHTS)
+    )]
     pub weights: Vec<String>,
 
     /// Weights that were trained on clean pairs only, in the same form, for the tables of models trained
@@ -65,30 +76,58 @@ pub struct TablesOptions {
     #[arg(long, value_name = "NAME=PATH", value_parser = named_weights)]
     pub variant: Vec<(String, PathBuf)>,
 
-    /// Seed of the pairs: corruptions, poses and order of the points
-    #[arg(long, value_name = "S", default_value_t = 1)]
+    #[arg(
+        long,
+        value_name = value::NUMBER,
+        default_value_t = 1,
+        value_parser = whole(0, u64::MAX),
+        allow_negative_numbers = true,
+        help = help::SEED
+    )]
     pub seed: u64,
 
-    /// Points of each cloud
-    #[arg(long, value_name = "N", default_value_t = 1024)]
+    #[arg(
+        long,
+        value_name = value::NUMBER,
+        default_value_t = 1024,
+        value_parser = whole(3, MOST_POINTS),
+        allow_negative_numbers = true,
+        help = help::POINTS
+    )]
     pub points: usize,
 
-    /// Where tensors live
-    #[arg(long, value_name = "NAME", default_value = "flex")]
+    #[arg(long, value_name = value::DEVICE, default_value = "flex", help = help::DEVICE)]
     pub device: String,
 
-    /// Worker threads [default: all cores]. Results do not depend on it
-    #[arg(long, value_name = "N")]
+    #[arg(
+        long,
+        value_name = value::NUMBER,
+        value_parser = whole(1, MOST_THREADS),
+        allow_negative_numbers = true,
+        help = help::THREADS
+    )]
     pub threads: Option<usize>,
 
     /// Folder for the report
-    #[arg(long, value_name = "DIR", default_value = "report")]
+    #[arg(short, long = "output", alias = "out", value_name = value::FOLDER, default_value = "report")]
     pub out: PathBuf,
 
     /// Folder for the answers that are kept [default: `cache` in the report's folder]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = value::FOLDER)]
     pub cache: Option<PathBuf>,
 }
+
+/// More about `--shapes`.
+const ALL_SHAPES: &str = "[default: all, or 20 built-in shapes]. All of ModelNet40's test split takes half a day on \
+     two idle cores";
+
+/// More about `--spread`.
+const SPREAD_TABLES: &str = "This is for the tables of models: five times the shapes in the same time. Curves, \
+     ablations and tables 4 and 5, which compare the same shapes, take a fifth of them";
+
+/// More about `--methods`.
+const ROWS_LEFT_OUT: &str = "[default: the paper's methods, and ours]. Those without weights are left out, and the \
+     report says so";
 
 /// Names of the parts of the report.
 pub(crate) const PARTS: [&str; 10] = [

@@ -13,11 +13,14 @@ use srrf::Registrar;
 
 use super::batch_output::Results;
 use super::batch_pairs::{PairRow, Pairs};
-use super::failure::Failure;
 use super::method::MethodArgs;
 use super::register::{failed, to_json, warning};
-use super::say::{Voice, count};
-use super::{Common, files, interrupt, transform};
+use super::transform;
+use srrf_args::Failure;
+use srrf_args::Output;
+use srrf_args::flags::{Common, value};
+use srrf_args::words::{count, counted};
+use srrf_args::{files, interrupt};
 
 const HELP: &str = "Exit codes:
   0    every pair has a pose (see `abstain` in its line)
@@ -37,8 +40,8 @@ pub struct BatchArgs {
     pairs: PathBuf,
 
     /// The results, one JSON object a line; or `-`
-    #[arg(short, long, value_name = "FILE")]
-    out: PathBuf,
+    #[arg(short, long, alias = "out", value_name = value::FILE)]
+    output: PathBuf,
 
     #[command(flatten)]
     method: MethodArgs,
@@ -52,25 +55,25 @@ pub struct BatchArgs {
 /// # Errors
 /// [`Failure`], with its exit code.
 pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
-    files::check_output(&args.out)?;
-    let threads = args.common.start_threads()?;
+    files::check_output(&args.output)?;
+    let threads = args.common.threads.start()?;
     let pairs = Pairs::read(&args.pairs)?;
-    let registrar = Registrar::new(args.method.options()).map_err(|e| Failure::Usage(e.to_string()))?;
+    let registrar = Registrar::new(args.method.options()).map_err(|e| Failure::usage(e.to_string()))?;
     let described = args.describe();
-    let (results, done) = Results::open(&args.out, &pairs.rows, &described)?;
+    let (results, done) = Results::open(&args.output, &pairs.rows, &described)?;
     let todo: Vec<&PairRow> = pairs.rows.iter().filter(|row| !done.contains_key(&row.number)).collect();
-    let voice = Voice::new(args.common.quiet, files::is_stream(&args.out));
+    let out = Output::new(args.common.quiet.quiet, files::is_stream(&args.output));
     if !done.is_empty() {
-        voice.say(&format!("{} of {} done already", count(done.len()), pairs_of(pairs.rows.len())));
+        out.say(&format!("{} of {} done already", count(done.len()), pairs_of(pairs.rows.len())));
     }
     interrupt::advise("; the same command goes on where this one stopped");
 
-    let bar = progress(todo.len(), args.common.quiet);
+    let bar = progress(todo.len(), args.common.quiet.quiet);
     let batch = Batch { pairs: &pairs, registrar: &registrar, described: &described };
     let tally = batch.run(&todo, threads, results, &bar)?;
     bar.finish_and_clear();
     let before = done.values().filter(|has_pose| !**has_pose).count();
-    voice.say(&format!(
+    out.say(&format!(
         "{}: {} probably right, {} abstained, {} without a pose",
         pairs_of(todo.len()),
         count(todo.len() - tally.abstained - tally.failed),
@@ -78,17 +81,14 @@ pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
         count(tally.failed)
     ));
     if before > 0 {
-        voice.say(&format!(
-            "{} done before without a pose: delete their lines to try again",
-            pairs_of(before)
-        ));
+        out.say(&format!("{} done before without a pose: delete their lines to try again", pairs_of(before)));
     }
     Ok(if tally.failed + before > 0 { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 
 /// `1 pair`, `1,234 pairs`.
 fn pairs_of(n: usize) -> String {
-    format!("{} pair{}", count(n), if n == 1 { "" } else { "s" })
+    counted(n, "pair")
 }
 
 impl BatchArgs {
@@ -99,8 +99,8 @@ impl BatchArgs {
             "method": m.method,
             "rotation": m.rotation,
             "refine": !m.no_refine,
-            "weights": m.weights,
-            "seed": m.seed,
+            "weights": m.weights.weights,
+            "seed": m.seed.seed,
         })
     }
 }
@@ -138,7 +138,7 @@ impl Batch<'_> {
                 Err(e) => {
                     let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
                     state.2 =
-                        Err(Failure::Other(format!("cannot start worker threads: {e}; try --threads 1")));
+                        Err(Failure::failed(format!("cannot start worker threads: {e}; try --threads 1")));
                     return;
                 }
             };

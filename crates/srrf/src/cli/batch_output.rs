@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::batch_pairs::PairRow;
-use super::failure::Failure;
-use super::{files, interrupt};
+use srrf_args::Failure;
+use srrf_args::{files, interrupt};
 
 /// A file of results that is being filled.
 pub struct Results {
@@ -26,8 +26,8 @@ impl Results {
     /// whether they have a pose.
     ///
     /// # Errors
-    /// [`Failure::Usage`] for a file that holds anything but results of `rows` with `options`;
-    /// [`Failure::Other`] where it cannot be written.
+    /// [`Failure::usage`] for a file that holds anything but results of `rows` with `options`;
+    /// [`Failure::failed`] where it cannot be written.
     pub fn open(
         path: &Path,
         rows: &[PairRow],
@@ -41,7 +41,7 @@ impl Results {
             ));
         }
         let failed =
-            |e: io::Error| Failure::Other(format!("cannot write {path:?}: {e}; choose another --out"));
+            |e: io::Error| Failure::failed(format!("cannot write {path:?}: {e}; choose another --output"));
         let file = OpenOptions::new().read(true).append(true).create(true).open(path).map_err(failed)?;
         let text = if file.metadata().map_err(failed)?.is_file() {
             std::fs::read(path).map_err(failed)?
@@ -51,7 +51,7 @@ impl Results {
         // A line without an end was cut off when the run was ended by force.
         let whole = text.iter().rposition(|b| *b == b'\n').map_or(0, |end| end + 1);
         let done = finished(&text[..whole], rows, options).map_err(|(line, problem)| {
-            Failure::Usage(format!(
+            Failure::usage(format!(
                 "{path:?}, line {line}: {problem}; choose another --out, or delete this file"
             ))
         })?;
@@ -65,7 +65,7 @@ impl Results {
     /// Takes the line of the pair at `place` (from 0, without gaps), and writes all whose turn it is.
     ///
     /// # Errors
-    /// [`Failure::Other`] where the file cannot be written.
+    /// [`Failure::failed`] where the file cannot be written.
     pub fn put(&mut self, place: usize, value: &Value) -> Result<(), Failure> {
         self.waiting.insert(place, format!("{value}\n"));
         while let Some(line) = self.waiting.remove(&self.next) {
@@ -73,7 +73,7 @@ impl Results {
             self.out
                 .write_all(line.as_bytes())
                 .and_then(|()| self.out.flush())
-                .map_err(|e| Failure::Other(format!("cannot write {:?}: {e}", self.path)))?;
+                .map_err(|e| Failure::failed(format!("cannot write {:?}: {e}", self.path)))?;
             self.next += 1;
         }
         Ok(())

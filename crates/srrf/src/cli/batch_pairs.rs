@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use csv_core::ReadFieldResult;
 
-use super::failure::Failure;
+use srrf_args::Failure;
 
 /// One line of the list.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,12 +32,12 @@ impl Pairs {
     /// others are passed over.
     ///
     /// # Errors
-    /// [`Failure::Usage`], which names the file and the line.
+    /// [`Failure::usage`], which names the file and the line.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let bytes = std::fs::read(path).map_err(|e| {
-            Failure::Usage(format!("cannot read {path:?}: {e}; it should be a CSV list of pairs"))
+            Failure::usage(format!("cannot read {path:?}: {e}; it should be a CSV list of pairs"))
         })?;
-        let rows = parse(&bytes).map_err(|problem| Failure::Usage(format!("{path:?}: {problem}")))?;
+        let rows = parse(&bytes).map_err(|problem| Failure::usage(format!("{path:?}: {problem}")))?;
         Ok(Self { rows, folder: path.parent().map(Path::to_owned).unwrap_or_default() })
     }
 

@@ -8,11 +8,12 @@ use clap::Args;
 use serde_json::{Value, json};
 use srrf_cloud::Solid;
 
-use super::Common;
-use super::failure::Failure;
-use super::files::{self, Input};
-use super::say::{Voice, count, length, points, vector};
 use super::statistics::Statistics;
+use srrf_args::Failure;
+use srrf_args::Output;
+use srrf_args::files::{self, Input};
+use srrf_args::flags::Common;
+use srrf_args::words::{count, length, points, vector};
 
 /// Say what is in clouds: sizes, bounds, spacing, points with NaN, and what looks corrupted.
 #[derive(Debug, Args)]
@@ -34,14 +35,14 @@ pub struct InspectArgs {
 /// # Errors
 /// [`Failure`], with its exit code.
 pub fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
-    args.common.start_threads()?;
+    args.common.threads.start()?;
     let mut values = Vec::new();
     let mut failures = Vec::new();
     for path in &args.files {
         match inspect(path) {
             Ok((input, statistics)) if args.json => values.push(to_json(&input, &statistics)),
             Ok((input, statistics)) => {
-                let out = Voice::new(args.common.quiet, false);
+                let out = Output::new(args.common.quiet.quiet, false);
                 out.say(to_text(&input, &statistics).trim_end());
             }
             Err(failure) => {
@@ -55,7 +56,7 @@ pub fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
     if args.json {
         files::write(Path::new("-"), format!("{:#}\n", Value::Array(values)).as_bytes())?;
     }
-    if failures.is_empty() { Ok(ExitCode::SUCCESS) } else { Err(Failure::Usage(failures.join("\nerror: "))) }
+    if failures.is_empty() { Ok(ExitCode::SUCCESS) } else { Err(Failure::usage(failures.join("\nerror: "))) }
 }
 
 fn inspect(path: &Path) -> Result<(Input, Statistics), Failure> {

@@ -1,7 +1,8 @@
 //! The options of a registration, shared by the verbs that register.
 
 use clap::Args;
-use srrf::{Method, Options, RotationRange};
+use srrf::{Method, Options, OptionsError, RotationRange};
+use srrf_args::flags::{Device, Seed, Weights, help, value};
 
 /// How to register.
 #[derive(Debug, Clone, Args)]
@@ -11,25 +12,33 @@ pub struct MethodArgs {
     #[arg(long, value_name = "NAME", default_value_t = Method::Auto)]
     pub method: Method,
 
-    /// How far the clouds may be turned: 45 (by less than that) or 180 (by anything)
-    #[arg(long, value_name = "DEGREES", default_value = "180")]
+    #[arg(
+        long,
+        value_name = value::ROTATION,
+        default_value = "so3",
+        value_parser = rotation,
+        help = help::ROTATION,
+        long_help = format!("{}\n\nHere 45 (by less than that about each axis) or so3 (180 means the same)", help::ROTATION)
+    )]
     pub rotation: RotationRange,
 
     /// Answer with the coarse pose
     #[arg(long)]
     pub no_refine: bool,
 
-    /// Weights of the network: a file, or a name that `srrf weights` lists [default: srrf]
-    #[arg(long, value_name = "NAME|FILE")]
-    pub weights: Option<String>,
+    #[command(flatten)]
+    pub weights: Weights,
 
-    /// Where the network runs: `flex` (CPU), and `ndarray`, `wgpu`, `vulkan`, `cuda`, `libtorch` where built in
-    #[arg(long, value_name = "NAME", default_value = "flex")]
-    pub device: String,
+    #[command(flatten)]
+    pub device: Device,
 
-    /// Seed of the random samples. The same seed gives the same answer
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
+    #[command(flatten)]
+    pub seed: Seed,
+}
+
+/// A range of rotations by its name.
+fn rotation(name: &str) -> Result<RotationRange, OptionsError> {
+    if name == "so3" { Ok(RotationRange::Any) } else { name.parse() }
 }
 
 impl MethodArgs {
@@ -38,9 +47,9 @@ impl MethodArgs {
         let mut options = Options {
             method: self.method,
             rotation: self.rotation,
-            weights: self.weights.clone(),
-            device: self.device.clone(),
-            seed: self.seed,
+            weights: self.weights.weights.clone(),
+            device: self.device.device.clone(),
+            seed: self.seed.seed,
             ..Options::default()
         };
         if self.no_refine {

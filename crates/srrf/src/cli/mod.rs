@@ -2,22 +2,18 @@
 
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+use srrf_args::{Failure, Scripts, interrupt};
+use srrf_corrupt::cli::{CorruptArgs, corrupt};
 
 mod batch;
 mod batch_output;
 mod batch_pairs;
-mod completions;
-mod corrupt;
-mod failure;
-mod files;
 mod inspect;
-mod interrupt;
 mod method;
 mod page;
 mod register;
 mod rrd;
-mod say;
 mod skeleton;
 mod statistics;
 mod summary;
@@ -49,42 +45,16 @@ enum Command {
     Inspect(inspect::InspectArgs),
     Batch(batch::BatchArgs),
     View(view::ViewArgs),
-    Corrupt(corrupt::CorruptArgs),
+    Corrupt(CorruptArgs),
     Skeleton(skeleton::SkeletonArgs),
     Weights(weights::WeightsArgs),
-    Completions(completions::CompletionsArgs),
+    #[command(flatten)]
+    Scripts(Scripts),
 }
 
-/// What every verb that computes takes.
-#[derive(Debug, Clone, Args)]
-pub struct Common {
-    /// Worker threads [default: all cores]. Results do not depend on it
-    #[arg(long, value_name = "N")]
-    pub threads: Option<usize>,
-
-    /// Say nothing but errors
-    #[arg(short, long)]
-    pub quiet: bool,
-}
-
-impl Common {
-    /// Starts the worker threads and answers how many they are.
-    ///
-    /// # Errors
-    /// [`Failure::Usage`] for no threads, [`Failure::Other`] where they cannot be started.
-    pub fn start_threads(&self) -> Result<usize, Failure> {
-        if self.threads == Some(0) {
-            return Err(Failure::Usage("--threads 0: at least one thread is needed".into()));
-        }
-        let mut builder = rayon::ThreadPoolBuilder::new();
-        if let Some(count) = self.threads {
-            builder = builder.num_threads(count);
-        }
-        builder
-            .build_global()
-            .map_err(|e| Failure::Other(format!("cannot start worker threads: {e}; try --threads 1")))?;
-        Ok(rayon::current_num_threads())
-    }
+/// The program's arguments, for tests that compare the programs.
+pub fn command() -> clap::Command {
+    Cli::command()
 }
 
 /// Does what was asked.
@@ -98,21 +68,17 @@ pub fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Batch(args) => batch::run(&args),
         Command::View(args) => view::run(&args),
-        Command::Corrupt(args) => corrupt::run(&args),
+        Command::Corrupt(args) => corrupt(&args),
         Command::Skeleton(args) => skeleton::run(&args),
         Command::Weights(args) => weights::run(&args),
-        Command::Completions(args) => completions::run(&args),
+        Command::Scripts(scripts) => scripts.run(command()),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
-    use super::*;
-
     #[test]
     fn options_do_not_clash() {
-        Cli::command().debug_assert();
+        super::command().debug_assert();
     }
 }

@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use srrf::Outcome;
+use srrf_args::flags::Axis;
 use srrf_cloud::{RIGHT_IN_WORDS, Rigid};
 use srrf_view::{Number, Page, Pair, Pose, Up};
 
-use super::files::Input;
-use super::say::count;
+use srrf_args::files::Input;
+use srrf_args::words::count;
 
 /// How to draw.
 #[derive(Debug, Clone, Args)]
@@ -17,21 +18,14 @@ pub struct PageArgs {
     #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
     unit: String,
 
-    /// The axis that points up on the page at first
-    #[arg(long, value_enum, default_value_t = Axis::Z)]
-    up: Axis,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Axis {
-    Z,
-    Y,
+    #[command(flatten)]
+    up: srrf_args::flags::Up,
 }
 
 impl PageArgs {
     /// A pair without poses.
     pub fn pair<'a>(&self, source: &'a Input, target: &'a Input) -> Pair<'a> {
-        let up = match self.up {
+        let up = match self.up.up {
             Axis::Z => Up::Z,
             Axis::Y => Up::Y,
         };

@@ -10,12 +10,13 @@ use srrf::{Outcome, Registrar, StageTime};
 use srrf_cloud::Rigid;
 use srrf_cloud::io::Kept;
 
-use super::failure::Failure;
-use super::files::{self, Input};
 use super::method::MethodArgs;
 use super::page::{self, PageArgs};
-use super::say::Voice;
-use super::{Common, EXIT_CODES, rrd, summary, transform};
+use super::{EXIT_CODES, rrd, summary, transform};
+use srrf_args::Failure;
+use srrf_args::Output;
+use srrf_args::files::{self, Input};
+use srrf_args::flags::Common;
 
 /// The exit code of an answer that is probably wrong.
 const ABSTAINED: u8 = 3;
@@ -81,15 +82,15 @@ pub struct RegisterArgs {
 /// [`Failure`], with its exit code.
 pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
     let begun = Instant::now();
-    let voice = args.check()?;
-    args.common.start_threads()?;
+    let out = args.check()?;
+    args.common.threads.start()?;
     let mut options = args.method.options();
     options.given = args.initial.as_deref().map(transform::read).transpose()?;
     let given = options.given;
     // The network loads while the files are read.
     let (inputs, registrar) = rayon::join(|| args.read(), || Registrar::new(options));
     let (source, target) = inputs?;
-    let registrar = registrar.map_err(|e| Failure::Usage(e.to_string()))?;
+    let registrar = registrar.map_err(|e| Failure::usage(e.to_string()))?;
     let opened = begun.elapsed().as_secs_f64();
 
     let mut outcome = registrar
@@ -101,18 +102,18 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
         .extend([&source, &target].into_iter().filter_map(|input| warning(&input.name, input.dropped)));
 
     let written = args.write(&outcome, &source, &target, given.as_ref())?;
-    if voice != Voice::Quiet {
-        voice.say(&summary::text(&outcome, &source, &target, begun.elapsed().as_secs_f64()));
-        written.iter().for_each(|line| voice.say(line));
+    if out != Output::Quiet {
+        out.say(&summary::text(&outcome, &source, &target, begun.elapsed().as_secs_f64()));
+        written.iter().for_each(|line| out.say(line));
     }
     Ok(if outcome.abstain { ExitCode::from(ABSTAINED) } else { ExitCode::SUCCESS })
 }
 
 impl RegisterArgs {
     /// Checks what can be checked before any work, and finds where to speak.
-    fn check(&self) -> Result<Voice, Failure> {
+    fn check(&self) -> Result<Output, Failure> {
         if files::is_stream(&self.source) && files::is_stream(&self.target) {
-            return Err(Failure::Usage(
+            return Err(Failure::usage(
                 "both clouds are `-`: standard input holds one; name a file for the other".into(),
             ));
         }
@@ -124,11 +125,11 @@ impl RegisterArgs {
         }
         let streams = outputs.into_iter().flatten().filter(|path| files::is_stream(path)).count();
         if streams > 1 {
-            return Err(Failure::Usage(format!(
+            return Err(Failure::usage(format!(
                 "{streams} results are to go to `-`: standard output takes one; name files for the others"
             )));
         }
-        Ok(Voice::new(self.common.quiet, streams > 0))
+        Ok(Output::new(self.common.quiet.quiet, streams > 0))
     }
 
     fn read(&self) -> Result<(Input, Input), Failure> {
@@ -196,8 +197,8 @@ pub fn failed(error: &srrf::Error, source: &str, target: &str) -> Failure {
     match error {
         srrf::Error::Source(e) => Failure::cloud(source, e),
         srrf::Error::Target(e) => Failure::cloud(target, e),
-        srrf::Error::Setup(problem) => Failure::Usage(problem.clone()),
-        srrf::Error::NoPose(_) | srrf::Error::Refine(_) => Failure::Other(format!(
+        srrf::Error::Setup(problem) => Failure::usage(problem.clone()),
+        srrf::Error::NoPose(_) | srrf::Error::Refine(_) => Failure::failed(format!(
             "{source:?} and {target:?}: {error}; look at both with `srrf inspect`, or give a first guess with --initial"
         )),
     }

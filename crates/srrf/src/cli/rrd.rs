@@ -4,16 +4,16 @@ use std::path::Path;
 
 use srrf::Outcome;
 
-use super::failure::Failure;
-use super::files::Input;
+use srrf_args::Failure;
+use srrf_args::files::Input;
 
 /// Refuses, before any work, what this build cannot write.
 ///
 /// # Errors
-/// [`Failure::Usage`] with the way to a build that can.
+/// [`Failure::usage`] with the way to a build that can.
 #[cfg(not(feature = "rerun"))]
 pub fn check(_: &Path) -> Result<(), Failure> {
-    Err(Failure::Usage(
+    Err(Failure::usage(
         "--rrd: this build writes no Rerun recordings; build with `cargo build -p srrf --features rerun`, or use \
          --html"
             .into(),
@@ -65,7 +65,7 @@ mod recording {
     /// # Errors
     /// [`Failure`] where it cannot be made or written; the file appears whole or not at all.
     pub fn write(path: &Path, outcome: &Outcome, source: &Input, target: &Input) -> Result<(), Failure> {
-        let failed = |e: &dyn std::fmt::Display| Failure::Other(format!("{}: {e}", path.display()));
+        let failed = |e: &dyn std::fmt::Display| Failure::failed(format!("{}: {e}", path.display()));
         let (stream, storage) = RecordingStreamBuilder::new("srrf").memory().map_err(|e| failed(&e))?;
         log(&stream, outcome, source, target).map_err(|e| failed(&e))?;
         let bytes = storage.drain_as_bytes().map_err(|e| failed(&e))?;

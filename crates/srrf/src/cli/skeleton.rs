@@ -7,11 +7,12 @@ use std::process::ExitCode;
 use clap::Args;
 use srrf::Skeleton;
 
-use super::Common;
-use super::failure::Failure;
-use super::files;
 use super::register::{failed, warning};
-use super::say::{Voice, count};
+use srrf_args::Failure;
+use srrf_args::Output;
+use srrf_args::files;
+use srrf_args::flags::{Common, Device, Weights, value};
+use srrf_args::words::count;
 
 /// Write the skeleton that the network sees in a cloud: centres and radii of spheres along its middle.
 ///
@@ -22,15 +23,18 @@ pub struct SkeletonArgs {
     input: PathBuf,
 
     /// The PLY file to write, or `-`
-    output: PathBuf,
+    #[arg(short, long, value_name = value::FILE, required_unless_present = "to")]
+    output: Option<PathBuf>,
 
-    /// Weights of the network: a file, or a name that `srrf weights` lists [default: srrf]
-    #[arg(long, value_name = "NAME|FILE")]
-    weights: Option<String>,
+    /// The same as `--output`
+    #[arg(hide = true, conflicts_with = "output")]
+    to: Option<PathBuf>,
 
-    /// Where the network runs
-    #[arg(long, value_name = "NAME", default_value = "flex")]
-    device: String,
+    #[command(flatten)]
+    weights: Weights,
+
+    #[command(flatten)]
+    device: Device,
 
     #[command(flatten)]
     common: Common,
@@ -41,22 +45,25 @@ pub struct SkeletonArgs {
 /// # Errors
 /// [`Failure`], with its exit code.
 pub fn run(args: &SkeletonArgs) -> Result<ExitCode, Failure> {
-    files::check_output(&args.output)?;
-    args.common.start_threads()?;
+    let Some(output) = args.output.as_ref().or(args.to.as_ref()) else {
+        return Err(Failure::usage("name the file to write: --output FILE".into()));
+    };
+    files::check_output(output)?;
+    args.common.threads.start()?;
     let input = files::read_solid(&args.input, None)?;
-    let skeleton = srrf::skeleton(&input.cloud, args.weights.as_deref(), &args.device)
+    let skeleton = srrf::skeleton(&input.cloud, args.weights.weights.as_deref(), &args.device.device)
         .map_err(|e| failed(&e, &input.name, &input.name))?;
-    files::write(&args.output, to_ply(&skeleton).as_bytes())?;
-    let voice = Voice::new(args.common.quiet, files::is_stream(&args.output));
-    voice.say(&format!(
+    files::write(output, to_ply(&skeleton).as_bytes())?;
+    let out = Output::new(args.common.quiet.quiet, files::is_stream(output));
+    out.say(&format!(
         "wrote {}: {} spheres of {}, by {}",
-        args.output.display(),
+        output.display(),
         count(skeleton.points.len()),
         input.name,
         skeleton.weights
     ));
     if let Some(warning) = warning(&input.name, input.dropped) {
-        voice.say(&format!("warning: {warning}"));
+        out.say(&format!("warning: {warning}"));
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 use srrf::Outcome;
 use srrf_cloud::RIGHT_IN_WORDS;
 
-use super::files::Input;
-use super::say::{count, length, points, vector};
+use srrf_args::files::Input;
+use srrf_args::words::{count, length, points, vector};
 
 /// The answer. `seconds` is the whole time.
 pub fn text(outcome: &Outcome, source: &Input, target: &Input, seconds: f64) -> String {

@@ -6,7 +6,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 use srrf_cloud::Rigid;
 
-use super::failure::Failure;
+use srrf_args::Failure;
 
 /// How far `R^T R` may be from the identity in files: what rows of four decimals come to.
 const TOLERANCE: f64 = 1e-3;
@@ -28,12 +28,12 @@ pub fn to_text(pose: &Rigid) -> String {
 /// Reads a pose from a file.
 ///
 /// # Errors
-/// [`Failure::Usage`], which names the file, the line and what is wrong with it.
+/// [`Failure::usage`], which names the file, the line and what is wrong with it.
 pub fn read(path: &Path) -> Result<Rigid, Failure> {
     let text = std::fs::read_to_string(path).map_err(|e| {
-        Failure::Usage(format!("cannot read {path:?}: {e}; it should hold a pose, 4 rows of 4"))
+        Failure::usage(format!("cannot read {path:?}: {e}; it should hold a pose, 4 rows of 4"))
     })?;
-    parse(&text).map_err(|problem| Failure::Usage(format!("{path:?}: {problem}")))
+    parse(&text).map_err(|problem| Failure::usage(format!("{path:?}: {problem}")))
 }
 
 /// Reads a pose: 4 rows of 4 numbers, apart by spaces or commas; `#` begins a comment.

@@ -6,12 +6,12 @@ use std::process::ExitCode;
 use clap::Args;
 use srrf_view::{Page, Pose};
 
-use super::Common;
-use super::failure::Failure;
-use super::files;
 use super::page::{PageArgs, title};
-use super::say::Voice;
 use super::transform;
+use srrf_args::Failure;
+use srrf_args::Output;
+use srrf_args::files;
+use srrf_args::flags::Common;
 
 /// Write a page that shows two clouds, and a pose between them if one is given.
 ///
@@ -45,12 +45,12 @@ pub struct ViewArgs {
 /// [`Failure`], with its exit code.
 pub fn run(args: &ViewArgs) -> Result<ExitCode, Failure> {
     if files::is_stream(&args.source) && files::is_stream(&args.target) {
-        return Err(Failure::Usage(
+        return Err(Failure::usage(
             "both clouds are `-`: standard input holds one; name a file for the other".into(),
         ));
     }
     files::check_output(&args.output)?;
-    args.common.start_threads()?;
+    args.common.threads.start()?;
     let pose = args.transform.as_deref().map(transform::read).transpose()?;
     let (source, target) = (files::read(&args.source, None)?, files::read(&args.target, None)?);
     let mut pair = args.page.pair(&source, &target);
@@ -59,7 +59,7 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode, Failure> {
     }
     let html = Page::new(title(&source, &target)).pair(pair).to_html();
     files::write(&args.output, html.as_bytes())?;
-    Voice::new(args.common.quiet, files::is_stream(&args.output))
+    Output::new(args.common.quiet.quiet, files::is_stream(&args.output))
         .say(&format!("wrote {}: open it in a browser", args.output.display()));
     Ok(ExitCode::SUCCESS)
 }

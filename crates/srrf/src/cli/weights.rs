@@ -7,9 +7,9 @@ use clap::{Args, Subcommand};
 use srrf_model::weights::{LoadedModel, parameters};
 use srrf_model::{device, embedded};
 
-use super::failure::Failure;
-use super::files;
-use super::say::count;
+use srrf_args::Failure;
+use srrf_args::files;
+use srrf_args::words::count;
 
 /// Model cards, by the name of the model.
 const CARDS: &[(&str, &str)] = &[
@@ -82,10 +82,10 @@ fn verify(weights: &str, sha256: Option<&str>) -> Result<String, Failure> {
     if let Some(wanted) = sha256 {
         let wanted = wanted.trim().to_ascii_lowercase();
         if wanted.len() < 8 || !wanted.chars().all(|c| c.is_ascii_hexdigit()) {
-            return Err(Failure::Usage(format!("--sha256 {wanted}: give 8 to 64 hexadecimal digits")));
+            return Err(Failure::usage(format!("--sha256 {wanted}: give 8 to 64 hexadecimal digits")));
         }
         if !loaded.sha256.starts_with(&wanted) {
-            return Err(Failure::Usage(format!(
+            return Err(Failure::usage(format!(
                 "{weights:?}: its SHA-256 is {}, not {wanted}; the file is damaged or another one, get it again",
                 loaded.sha256
             )));
@@ -93,7 +93,7 @@ fn verify(weights: &str, sha256: Option<&str>) -> Result<String, Failure> {
     }
     let all = parameters(&loaded.model);
     if let Some((name, _)) = all.iter().find(|(_, (_, values))| values.iter().any(|v| !v.is_finite())) {
-        return Err(Failure::Usage(format!(
+        return Err(Failure::usage(format!(
             "{weights:?}: parameter `{name}` has numbers that are not finite; train it again or get another file"
         )));
     }
@@ -113,8 +113,8 @@ fn verify(weights: &str, sha256: Option<&str>) -> Result<String, Failure> {
 }
 
 fn open(weights: &str) -> Result<LoadedModel, Failure> {
-    let device = device("flex").map_err(|e| Failure::Other(e.to_string()))?;
-    embedded::open(weights, &device).map_err(|e| Failure::Usage(e.to_string()))
+    let device = device("flex").map_err(|e| Failure::failed(e.to_string()))?;
+    embedded::open(weights, &device).map_err(|e| Failure::usage(e.to_string()))
 }
 
 fn parameter_count(loaded: &LoadedModel) -> usize {
@@ -123,7 +123,7 @@ fn parameter_count(loaded: &LoadedModel) -> usize {
 
 fn unknown(name: &str) -> Failure {
     let known: Vec<&str> = embedded::names().collect();
-    Failure::Usage(format!(
+    Failure::usage(format!(
         "{name:?}: no such file, and no model of that name; the program has {}",
         known.join(", ")
     ))

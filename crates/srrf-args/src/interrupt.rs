@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::failure::Failure;
+use crate::failure::Failure;
 
 /// Held while a file is written.
 static WRITING: Mutex<()> = Mutex::new(());
@@ -23,13 +23,13 @@ pub fn advise(advice: &'static str) {
 /// Listens for Ctrl-C and for termination.
 ///
 /// # Errors
-/// [`Failure::Other`] where the system refuses.
+/// [`Failure`] where the system refuses.
 pub fn install() -> Result<(), Failure> {
     ctrlc::set_handler(|| {
         let _guard = hold();
         let advice = *ADVICE.lock().unwrap_or_else(PoisonError::into_inner);
         let _ = writeln!(std::io::stderr(), "\ninterrupted{advice}");
-        std::process::exit(130);
+        std::process::exit(i32::from(crate::INTERRUPTED));
     })
-    .map_err(|e| Failure::Other(format!("cannot listen for Ctrl-C: {e}")))
+    .map_err(|e| Failure::failed(format!("cannot listen for Ctrl-C: {e}")).because(e))
 }

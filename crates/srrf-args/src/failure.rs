@@ -1,40 +1,73 @@
-//! [`Failure`]: what went wrong, and the exit code that says whose turn it is.
+//! [`Failure`]: what went wrong, whose turn it is, and why.
 
+use std::error::Error;
 use std::fmt;
 use std::process::ExitCode;
 
 use srrf_cloud::CloudError;
 use srrf_cloud::io::IoError;
 
-/// Why the program stops.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Failure {
-    /// Bad usage or input: exit code 2.
-    Usage(String),
-    /// Anything else: exit code 1.
-    Other(String),
+use crate::exit::{FAILED, USAGE};
+
+/// Why a program stops: a message with a way out, an exit code, and the error behind it.
+#[derive(Debug)]
+pub struct Failure {
+    code: u8,
+    message: String,
+    source: Option<Box<dyn Error + Send + Sync>>,
 }
 
 impl Failure {
-    /// 2 for bad usage or input, 1 for the rest.
-    pub fn exit_code(&self) -> ExitCode {
-        match self {
-            Self::Usage(_) => ExitCode::from(2),
-            Self::Other(_) => ExitCode::from(1),
-        }
+    /// Bad usage or input: exit code 2.
+    pub fn usage(message: String) -> Self {
+        Self { code: USAGE, message, source: None }
+    }
+
+    /// Anything else: exit code 1.
+    pub fn failed(message: String) -> Self {
+        Self { code: FAILED, message, source: None }
+    }
+
+    /// An error that usage or input causes.
+    pub fn input(error: impl Error + Send + Sync + 'static) -> Self {
+        Self::usage(error.to_string()).because(error)
+    }
+
+    /// An error that nobody typed.
+    pub fn other(error: impl Error + Send + Sync + 'static) -> Self {
+        Self::failed(error.to_string()).because(error)
+    }
+
+    /// The same failure, with the error behind it.
+    pub fn because(self, error: impl Error + Send + Sync + 'static) -> Self {
+        Self { source: Some(Box::new(error)), ..self }
     }
 
     /// A cloud, by its name, that cannot be used.
     pub fn cloud(name: &str, error: &CloudError) -> Self {
-        Self::Usage(format!("{name:?}: {error}{}", way_out(error)))
+        Self::usage(format!("{name:?}: {error}{}", way_out(error))).because(error.clone())
+    }
+
+    /// Whether the user can put it right.
+    pub fn is_usage(&self) -> bool {
+        self.code == USAGE
+    }
+
+    /// 2 for bad usage or input, 1 for the rest.
+    pub fn exit_code(&self) -> ExitCode {
+        ExitCode::from(self.code)
     }
 }
 
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Usage(message) | Self::Other(message) => f.write_str(message),
-        }
+        f.write_str(&self.message)
+    }
+}
+
+impl Error for Failure {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        self.source.as_deref().map(|source| source as _)
     }
 }
 
@@ -57,7 +90,8 @@ impl From<IoError> for Failure {
             | IoError::NotFinite { .. } => "",
         };
         let message = format!("{error}{hint}");
-        if matches!(error, IoError::Write { .. }) { Self::Other(message) } else { Self::Usage(message) }
+        let code = if matches!(error, IoError::Write { .. }) { FAILED } else { USAGE };
+        Self { code, message, source: Some(Box::new(error)) }
     }
 }
 
@@ -82,11 +116,13 @@ mod tests {
             source: std::io::Error::from(std::io::ErrorKind::NotFound),
         };
         let failure = Failure::from(missing);
-        assert!(
-            matches!(&failure, Failure::Usage(m) if m.contains("\"a.ply\"") && m.ends_with("check the path"))
-        );
+        let message = failure.to_string();
+        assert!(failure.is_usage() && message.contains("\"a.ply\""), "{message}");
+        assert!(message.ends_with("check the path"), "{message}");
+        assert!(failure.source().is_some_and(|e| e.is::<IoError>()), "the error behind it is kept");
         let full = IoError::Write { path: "b.ply".into(), source: std::io::Error::other("no space") };
-        assert!(matches!(Failure::from(full), Failure::Other(m) if m.contains("b.ply")));
+        let failure = Failure::from(full);
+        assert!(!failure.is_usage() && failure.to_string().contains("b.ply"));
         let few = Failure::cloud("c.xyz", &CloudError::TooFew { have: 2, need: 3 }).to_string();
         assert!(few.starts_with("\"c.xyz\": the cloud has 2 points"), "{few}");
     }

@@ -9,8 +9,8 @@ use srrf_cloud::io::{
 };
 use srrf_cloud::{CloudError, PointCloud, Rigid, Solid};
 
-use super::failure::Failure;
-use super::interrupt;
+use crate::failure::Failure;
+use crate::interrupt;
 
 /// A cloud with the file that it came from.
 #[derive(Debug)]
@@ -33,13 +33,13 @@ pub fn is_stream(path: &Path) -> bool {
 /// Reads a cloud. `format` is for streams.
 ///
 /// # Errors
-/// [`Failure::Usage`], which names the file.
+/// [`Failure::usage`], which names the file.
 pub fn read(path: &Path, format: Option<&str>) -> Result<Input, Failure> {
     let file = match (is_stream(path), format) {
         (true, format) => CloudFile::from_reader(&mut io::stdin().lock(), format)?,
         (false, None) => CloudFile::open(path)?,
         (false, Some(format)) => {
-            return Err(Failure::Usage(format!(
+            return Err(Failure::usage(format!(
                 "{path:?} is a file, whose name or content says its format; `{format}` can be asked for streams only"
             )));
         }
@@ -54,7 +54,7 @@ pub fn read(path: &Path, format: Option<&str>) -> Result<Input, Failure> {
 /// No point is there, or none that is finite.
 fn nothing_left(file: &CloudFile, path: PathBuf) -> Failure {
     match file.points() {
-        Ok(points) => Failure::Usage(format!(
+        Ok(points) => Failure::usage(format!(
             "{path:?}: each of its {} points has a coordinate that is NaN or infinite; write the file again with numbers",
             points.len()
         )),
@@ -75,17 +75,17 @@ pub fn read_solid(path: &Path, format: Option<&str>) -> Result<Input, Failure> {
 /// Checks, before any work is done, that there is a place for `path`.
 ///
 /// # Errors
-/// [`Failure::Usage`] for a folder, or a file in a folder that does not exist or takes no files.
+/// [`Failure::usage`] for a folder, or a file in a folder that does not exist or takes no files.
 pub fn check_output(path: &Path) -> Result<(), Failure> {
     if is_stream(path) {
         return Ok(());
     }
     if path.is_dir() {
-        return Err(Failure::Usage(format!("cannot write {path:?}: it is a folder; name a file in it")));
+        return Err(Failure::usage(format!("cannot write {path:?}: it is a folder; name a file in it")));
     }
     let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
-        return Err(Failure::Usage(format!(
+        return Err(Failure::usage(format!(
             "cannot write {path:?}: the folder {folder:?} does not exist; create it first"
         )));
     }
@@ -93,7 +93,7 @@ pub fn check_output(path: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     tempfile::tempfile_in(folder).map(|_| ()).map_err(|e| {
-        Failure::Usage(format!(
+        Failure::usage(format!(
             "cannot write {path:?}: no file can be made in {folder:?} ({e}); choose another place"
         ))
     })
@@ -102,13 +102,13 @@ pub fn check_output(path: &Path) -> Result<(), Failure> {
 /// As [`check_output`], for a cloud, whose extension says the format.
 ///
 /// # Errors
-/// As [`check_output`]; [`Failure::Usage`] for an extension of no known format.
+/// As [`check_output`]; [`Failure::usage`] for an extension of no known format.
 pub fn check_cloud_output(path: &Path) -> Result<(), Failure> {
     check_output(path)?;
     if is_stream(path) || is_special(path) || is_cloud_file(path) {
         return Ok(());
     }
-    Err(Failure::Usage(format!(
+    Err(Failure::usage(format!(
         "cannot write {path:?}: its extension names no format of clouds that this build has; use one of {}",
         srrf_cloud::io::format_names().join(", ")
     )))
@@ -122,7 +122,7 @@ fn is_special(path: &Path) -> bool {
 /// Writes a result, whole or not at all.
 ///
 /// # Errors
-/// [`Failure::Other`], which names the file.
+/// [`Failure::failed`], which names the file.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let _guard = interrupt::hold();
     let written = if is_stream(path) {
@@ -134,7 +134,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         write_atomically(path, |out| out.write_all(bytes))
     };
     written.map_err(|e| {
-        Failure::Other(format!("cannot write {path:?}: {e}; choose another place for the output"))
+        Failure::failed(format!("cannot write {path:?}: {e}; choose another place for the output"))
     })
 }
 

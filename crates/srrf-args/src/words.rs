@@ -1,41 +1,15 @@
-//! Lines for people: on standard output, or on standard error where that carries a result.
-
-use std::io::{self, Write};
-
-/// Where lines for people go.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Voice {
-    /// Standard output.
-    Output,
-    /// Standard error, because standard output carries a result.
-    Aside,
-    /// Nowhere.
-    Quiet,
-}
-
-impl Voice {
-    /// The voice of a run.
-    pub fn new(quiet: bool, output_is_taken: bool) -> Self {
-        match (quiet, output_is_taken) {
-            (true, _) => Self::Quiet,
-            (false, true) => Self::Aside,
-            (false, false) => Self::Output,
-        }
-    }
-
-    /// Says a line. A reader that has gone away, as `head` does, is no failure.
-    pub fn say(self, line: &str) {
-        let _ = match self {
-            Self::Output => writeln!(io::stdout(), "{line}"),
-            Self::Aside => writeln!(io::stderr(), "{line}"),
-            Self::Quiet => Ok(()),
-        };
-    }
-}
+//! Words that the programs share: figures, lengths, counts.
 
 /// `1,234,567`.
 pub fn count(n: usize) -> String {
-    let digits = n.to_string();
+    grouped(&n.to_string())
+}
+
+/// A whole number in digits, with commas between groups of three; other text as it is.
+pub fn grouped(digits: &str) -> String {
+    if !digits.bytes().all(|b| b.is_ascii_digit()) {
+        return digits.to_owned();
+    }
     let mut grouped = String::new();
     for (i, digit) in digits.chars().enumerate() {
         if i > 0 && (digits.len() - i).is_multiple_of(3) {
@@ -46,9 +20,24 @@ pub fn count(n: usize) -> String {
     grouped
 }
 
+/// `1 pair`, `1,234 pairs`.
+pub fn counted(n: usize, thing: &str) -> String {
+    format!("{} {thing}{}", count(n), if n == 1 { "" } else { "s" })
+}
+
 /// `1 point`, `1,234 points`.
 pub fn points(n: usize) -> String {
-    format!("{} point{}", count(n), if n == 1 { "" } else { "s" })
+    counted(n, "point")
+}
+
+/// `12.3 s`, `3 min 20 s`, `2 h 5 min`.
+pub fn duration(seconds: f64) -> String {
+    let whole = if seconds.is_finite() { seconds.round().max(0.0) as u64 } else { 0 };
+    match whole {
+        0..60 => format!("{seconds:.1} s"),
+        60..3600 => format!("{} min {} s", whole / 60, whole % 60),
+        _ => format!("{} h {} min", whole / 3600, whole / 60 % 60),
+    }
 }
 
 /// A length in `digits` significant digits, without an exponent for everyday sizes.
@@ -87,6 +76,7 @@ mod tests {
             assert_eq!(length(value, 4), text);
         }
         assert_eq!(vector([500_000.123_456, -2.0, 0.1], 1.3, 4), "(500000.123, -2.000, 0.100)");
-        assert_eq!(Voice::new(true, true), Voice::Quiet);
+        assert_eq!(grouped("-1.5"), "-1.5");
+        assert_eq!(["12.3 s", "3 min 20 s", "2 h 5 min"], [12.34, 200.2, 7520.0].map(duration));
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use srrf_corrupt::CorruptionKind;
+use crate::corruptions::CorruptionKind;
 
 /// One line for each corruption: its name, what it does, and what grows with the severity.
 pub fn list() -> String {

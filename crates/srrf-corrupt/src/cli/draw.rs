@@ -2,10 +2,16 @@
 
 use embedded_graphics::mono_font::ascii::{FONT_7X13, FONT_9X15_BOLD, FONT_10X20};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
+use srrf_args::flags::Axis;
 use srrf_cloud::PointCloud;
-use srrf_corrupt::{CorruptError, Corrupted, CorruptionKind, Family, Severity, Variants, corruption};
 
-use crate::canvas::{Canvas, Colour, Window};
+use super::canvas::{Canvas, Colour, Window};
+use crate::card::Family;
+use crate::corruption::{CorruptError, Corrupted};
+use crate::corruptions::CorruptionKind;
+use crate::kind::corruption;
+use crate::severity::Severity;
+use crate::variants::Variants;
 
 const TILE: [i32; 2] = [208, 176];
 const LABELS: i32 = 214;
@@ -26,15 +32,6 @@ const OLD: [Colour; 2] = [[16, 42, 92], [168, 190, 220]];
 const NEW: [Colour; 2] = [[208, 68, 16], [250, 186, 140]];
 const GONE: Colour = [238, 150, 150];
 
-/// The axis that points up in the picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Up {
-    /// As in ModelNet40's HDF5 files.
-    Y,
-    /// As in the built-in shapes and most scans.
-    Z,
-}
-
 /// What a sheet shows.
 pub struct Sheet<'a> {
     /// The clean cloud, canonical frame.
@@ -46,7 +43,7 @@ pub struct Sheet<'a> {
     /// Seed of the draws.
     pub seed: u64,
     /// Upward axis.
-    pub up: Up,
+    pub up: Axis,
     /// Where the eye is, in degrees around the upward axis.
     pub yaw_deg: f64,
 }
@@ -176,8 +173,8 @@ impl Sheet<'_> {
     /// Right, up and towards the eye, seen from 25 degrees above.
     fn view(&self, p: &[f64; 3]) -> [f64; 3] {
         let [x, y, z] = match self.up {
-            Up::Y => [p[2], p[0], p[1]],
-            Up::Z => *p,
+            Axis::Y => [p[2], p[0], p[1]],
+            Axis::Z => *p,
         };
         let (sin_yaw, cos_yaw) = self.yaw_deg.to_radians().sin_cos();
         let (sin_pitch, cos_pitch) = 25f64.to_radians().sin_cos();

@@ -1,0 +1,65 @@
+//! The frame of a program.
+
+use std::ffi::OsString;
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::failure::Failure;
+
+/// Parses the arguments of the process, does what they ask for, and turns a failure into a message on standard error
+/// and an exit code. Help and version end with 0, arguments that cannot be parsed with 2.
+pub fn run_program<A: Parser>(work: impl FnOnce(A) -> Result<ExitCode, Failure>) -> ExitCode {
+    run_on(std::env::args_os(), work, &mut std::io::stderr())
+}
+
+fn run_on<A: Parser>(
+    arguments: impl IntoIterator<Item = OsString>,
+    work: impl FnOnce(A) -> Result<ExitCode, Failure>,
+    errors: &mut dyn Write,
+) -> ExitCode {
+    let arguments = match A::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // A reader that has gone away is no failure.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { crate::USAGE } else { 0 });
+        }
+    };
+    match work(arguments) {
+        Ok(code) => code,
+        Err(failure) => {
+            let _ = writeln!(errors, "error: {failure}");
+            failure.exit_code()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Parser)]
+    struct Arguments {
+        #[arg(long)]
+        good: bool,
+    }
+
+    fn run(arguments: &[&str]) -> (ExitCode, String) {
+        let mut errors = Vec::new();
+        let work = |a: Arguments| {
+            if a.good { Ok(ExitCode::SUCCESS) } else { Err(Failure::failed("it rains".into())) }
+        };
+        let code = run_on(arguments.iter().map(OsString::from), work, &mut errors);
+        (code, String::from_utf8(errors).unwrap())
+    }
+
+    #[test]
+    fn messages_and_codes() {
+        assert_eq!(run(&["p", "--good"]), (ExitCode::SUCCESS, String::new()));
+        assert_eq!(run(&["p"]), (ExitCode::from(1), "error: it rains\n".to_owned()));
+        assert_eq!(run(&["p", "--bad"]).0, ExitCode::from(2));
+        assert_eq!(run(&["p", "--help"]).0, ExitCode::SUCCESS);
+    }
+}
