@@ -75,6 +75,7 @@ pub mod value {
 /// `--threads`
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Threads {
+    /// Worker threads, where they were given.
     #[arg(
         long,
         value_name = value::NUMBER,
@@ -110,9 +111,11 @@ impl Threads {
 /// What every verb takes that computes and then speaks.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Common {
+    /// Worker threads, where they were given.
     #[command(flatten)]
     pub threads: Threads,
 
+    /// Whether to say nothing but errors.
     #[command(flatten)]
     pub quiet: Quiet,
 }
@@ -128,6 +131,7 @@ pub struct Quiet {
 /// `--seed`
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Seed<const DEFAULT: u64 = 0> {
+    /// The seed.
     #[arg(
         long,
         value_name = value::NUMBER,
@@ -142,6 +146,7 @@ pub struct Seed<const DEFAULT: u64 = 0> {
 /// `--device`
 #[derive(Debug, Clone, Args)]
 pub struct Device {
+    /// Name of the device.
     #[arg(long, value_name = value::DEVICE, default_value = "flex", help = help::DEVICE)]
     pub device: String,
 }
@@ -149,6 +154,7 @@ pub struct Device {
 /// `--weights`
 #[derive(Debug, Clone, Args)]
 pub struct Weights {
+    /// Name or file of the weights, where one was given.
     #[arg(long, value_name = value::WEIGHTS, help = help::WEIGHTS)]
     pub weights: Option<String>,
 }
@@ -156,6 +162,7 @@ pub struct Weights {
 /// `--data`
 #[derive(Debug, Clone, Args)]
 pub struct Data {
+    /// Path of the data, where one was given.
     #[arg(long, value_name = value::PATH, help = help::DATA)]
     pub data: Option<PathBuf>,
 }
@@ -172,6 +179,7 @@ pub enum Axis {
 /// `--up`
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Up {
+    /// The axis.
     #[arg(long, value_enum, value_name = value::UP, default_value_t = Axis::Z, help = help::UP)]
     pub up: Axis,
 }
@@ -179,6 +187,7 @@ pub struct Up {
 /// `--profile`
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Profile {
+    /// Whether times are wanted.
     #[arg(long, help = help::PROFILE)]
     pub profile: bool,
 }

@@ -5,7 +5,8 @@ use std::str::FromStr;
 
 use crate::words::grouped;
 
-/// A whole number from `least` to `most`.
+/// A whole number from `least` to `most`, of the type of the field: clap compares the two when it runs, not the
+/// compiler.
 pub fn whole<T>(least: T, most: T) -> impl Fn(&str) -> Result<T, String> + Clone
 where
     T: FromStr + PartialOrd + Copy + Display,

@@ -54,7 +54,7 @@ impl Scripts {
                 fs::create_dir_all(&args.folder).map_err(cannot)?;
                 command.build();
                 let mut written = Vec::new();
-                write_pages(&command, command.get_name(), &args.folder, &mut written)?;
+                write_pages(&command, &args.folder, &mut written)?;
                 Output::Standard.say(&format!("wrote {}: {}", args.folder.display(), written.join(", ")));
             }
         }
@@ -62,25 +62,17 @@ impl Scripts {
     }
 }
 
-/// The page of `command`, called `name`, and those of its commands.
-fn write_pages(
-    command: &Command,
-    name: &str,
-    folder: &Path,
-    written: &mut Vec<String>,
-) -> Result<(), Failure> {
-    let file = format!("{name}.1");
-    let mut page = Vec::new();
-    Man::new(command.clone().name(name.to_owned()))
-        .render(&mut page)
+/// The page of `command` and those of its commands.
+fn write_pages(command: &Command, folder: &Path, written: &mut Vec<String>) -> Result<(), Failure> {
+    let page = Man::new(command.clone());
+    let file = page.get_filename();
+    let mut text = Vec::new();
+    page.render(&mut text)
         .map_err(|e| Failure::failed(format!("cannot write the page {file}: {e}")).because(e))?;
-    files::write(&folder.join(&file), &page)?;
+    files::write(&folder.join(&file), &text)?;
     written.push(file);
-    let commands = command.get_subcommands().filter(|c| c.get_name() != "help" && !c.is_hide_set());
-    for inner in commands {
-        write_pages(inner, &format!("{name}-{}", inner.get_name()), folder, written)?;
-    }
-    Ok(())
+    let mut commands = command.get_subcommands().filter(|c| c.get_name() != "help" && !c.is_hide_set());
+    commands.try_for_each(|inner| write_pages(inner, folder, written))
 }
 
 #[cfg(test)]

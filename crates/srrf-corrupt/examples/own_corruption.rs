@@ -35,8 +35,9 @@ impl Corruption for Fading {
     }
 }
 
+/// Makes a pair at each severity and checks it against perfect correspondences.
 #[allow(clippy::print_stdout, reason = "an example that prints its result")]
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let shapes = ProceduralShapes::new(7, 3, None)?;
     let synthesizer = PairSynthesizer::new(PairConfig { points: 512, ..PairConfig::default() })?;
     for severity in Severity::ALL {

@@ -57,7 +57,7 @@ fn corrupts_a_file_in_its_own_unit_and_repeats_itself() {
         // There and back over the unit sphere of a cloud 5,000 away costs some last places.
         assert!(clean.iter().any(|q| (0..3).all(|c| (p[c] - q[c]).abs() < 1e-9)));
     }
-    program(&folder, "in.xyz --corruption cutout --severity 3 --seed 1 -o again.ply");
+    program(&folder, "in.xyz again.ply -t cutout --severity 3 --seed 1 --quiet");
     program(&folder, "in.xyz --corruption cutout --severity 3 --seed 2 -o other.ply");
     let bytes = |name: &str| fs::read(folder.path().join(name)).unwrap();
     assert_eq!(bytes("out.ply"), bytes("again.ply"));
@@ -87,7 +87,6 @@ fn bad_usage_and_bad_input_are_refused() {
     refuses(&folder, "in.xyz -c cutout -s 9 -o out.ply", &["severity 9 does not exist", "1, 2, 3, 4 and 5"]);
     refuses(&folder, "in.xyz -c rain -o out.ply", &["unknown corruption `rain`", "distortion_rbf_inv"]);
     refuses(&folder, "none.ply -c cutout -o out.ply", &["none.ply"]);
-    refuses(&folder, "nan.xyz -c uniform -o out.ply", &["nan.xyz", "1 of 3 points"]);
     refuses(&folder, "three.xyz -c density_dec -o out.ply", &["three.xyz", "at least 32 points", "has 3"]);
     refuses(&folder, "empty.xyz -c uniform -o out.ply", &["empty.xyz", "empty"]);
     refuses(&folder, "in.xyz -c uniform -o out.docx", &["out.docx", "ply"]);
@@ -95,8 +94,11 @@ fn bad_usage_and_bad_input_are_refused() {
     refuses(&folder, "in.xyz -o out.ply", &["--corruption"]);
     refuses(&folder, "", &["--corruption <NAME>", "<INPUT>", "--help"]);
     refuses(&folder, "sheet none.ply -o sheet.png", &["none.ply"]);
-    let output = program(&folder, "nan.xyz -c uniform --drop-nan -o out.ply");
+    refuses(&folder, "in.xyz -c uniform -o out.ply --seed -1", &["--seed <N>", "from 0 to"]);
+    refuses(&folder, "sheet -o out.ply --points 31", &["--points <N>", "from 32 to 100,000"]);
+    let output = program(&folder, "nan.xyz -c uniform -o out.ply");
     assert_eq!(output.status.code(), Some(0), "{output:?}");
+    assert!(String::from_utf8(output.stdout).unwrap().contains("1 with NaN or infinity were left out"));
     assert_eq!(points(&folder, "out.ply").len(), 2);
 }
 

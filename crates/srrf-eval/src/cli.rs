@@ -29,9 +29,11 @@ pub struct Options {
     #[command(subcommand)]
     pub command: Option<Command>,
 
+    /// Path of the data, where one was given.
     #[arg(long, value_name = value::PATH, help = help::DATA, long_help = format!("{}\n\n{TEST_SPLIT}", help::DATA))]
     pub data: Option<PathBuf>,
 
+    /// Number of shapes.
     #[arg(
         long,
         value_name = value::NUMBER,
@@ -54,9 +56,11 @@ pub struct Options {
     #[arg(long, value_name = "NUMBERS", value_delimiter = ',', value_parser = entry::<Severity>)]
     pub severities: Vec<Severity>,
 
+    /// Whether each shape is shown at one severity only.
     #[arg(long, help = help::SPREAD, long_help = format!("{}: many shapes in a fraction of the time", help::SPREAD))]
     pub spread: bool,
 
+    /// Rows of the tables.
     #[arg(
         long,
         value_name = value::NAMES,
@@ -67,6 +71,7 @@ pub struct Options {
     )]
     pub methods: Vec<String>,
 
+    /// The seed.
     #[arg(
         long,
         value_name = value::NUMBER,
@@ -77,12 +82,15 @@ pub struct Options {
     )]
     pub seed: u64,
 
+    /// Name of the device.
     #[arg(long, value_name = value::DEVICE, default_value = "flex", help = help::DEVICE)]
     pub device: String,
 
+    /// Whether times are wanted.
     #[arg(long, help = help::PROFILE)]
     pub profile: bool,
 
+    /// Name or file of the weights, where one was given.
     #[arg(
         long,
         value_name = value::WEIGHTS,
@@ -91,6 +99,7 @@ pub struct Options {
     )]
     pub weights: Vec<String>,
 
+    /// Worker threads, where they were given.
     #[arg(
         long,
         value_name = value::NUMBER,
@@ -117,6 +126,7 @@ pub struct Options {
     #[arg(long, value_name = "FILE")]
     pub transforms: Vec<PathBuf>,
 
+    /// Points of each cloud.
     #[arg(
         long,
         value_name = value::NUMBER,
@@ -143,6 +153,7 @@ pub struct Options {
     #[arg(long, value_name = "WHEN", value_parser = ["none", "canonical", "after_pose"], default_value = "none")]
     pub normalize: String,
 
+    /// Range of the rotation.
     #[arg(
         long,
         value_name = value::ROTATION,
@@ -162,6 +173,7 @@ pub struct Options {
     )]
     pub translation: f64,
 
+    /// Reading of the corruptions.
     #[command(flatten)]
     pub reading: ReadingArgs,
 }

@@ -82,7 +82,7 @@ pub enum EvalError {
         array: String,
     },
     /// The folder for results cannot be used.
-    #[error("cannot write results to {path:?}: {source}; choose another folder with --out")]
+    #[error("cannot write results to {path:?}: {source}; choose another folder with --output")]
     OutDir {
         /// The folder.
         path: PathBuf,

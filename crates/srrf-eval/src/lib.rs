@@ -40,7 +40,10 @@ pub use chamfer::{CleanShape, SkeletonAgreement};
 pub use cli::{Command, Options, command};
 pub use error::EvalError;
 pub use methods::{METHODS, Method, MethodContext, MethodEntry, ORACLE, Selection, all_rows, select};
-pub use metrics::{MetricError, PairError, RECALL_ROTATION_DEG, RECALL_TRANSLATION, Scores};
+pub use metrics::{
+    MetricError, PairError, RECALL_ROTATION_DEG, RECALL_TRANSLATION, RIGHT_RADIUS_SHARE, RIGHT_ROTATION_DEG,
+    Scores, is_right,
+};
 pub use npz_writer::NpzWriter;
 pub use pair_file::{PairFile, export};
 pub use pairs::{EvalPair, Group, PairSource};

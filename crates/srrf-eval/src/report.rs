@@ -287,7 +287,7 @@ mod tests {
     fn a_folder_that_cannot_be_is_refused_at_the_start() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let error = prepare(&file.path().join("report")).unwrap_err();
-        assert!(error.to_string().contains("--out"), "{error}");
+        assert!(error.to_string().contains("--output"), "{error}");
         assert!(error.is_usage());
     }
 }

@@ -19,9 +19,10 @@ fn bad_options_are_named() {
     check(&["--severities", "9"], &["severity 9", "1, 2, 3, 4 and 5"]);
     check(&["--severities", "0"], &["severity 0"]);
     check(&["--methods", "magic"], &["`magic`", "identity, icp"]);
-    check(&["--shapes", "0"], &["--shapes 0"]);
-    check(&["--points", "2"], &["at least 3 points"]);
-    check(&["--threads", "0"], &["--threads 0"]);
+    check(&["--shapes", "0"], &["--shapes <N>", "from 1 to"]);
+    check(&["--points", "2"], &["--points <N>", "from 3 to"]);
+    check(&["--threads", "0"], &["--threads <N>", "from 1 to 4,096"]);
+    check(&["--methods", "icp;oracle"], &["--methods", "apart by commas: icp,oracle"]);
     check(&["--rotation", "wide"], &["--rotation wide", "so3"]);
     check(&["--translation", "NaN"], &["translation"]);
     check(&["--corrupt", "neither"], &["neither", "both"]);
@@ -93,7 +94,7 @@ fn an_output_folder_that_cannot_be_is_refused_before_the_work() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("file"), "").unwrap();
     let message = refusal(folder.path(), &["--out", "file/report"]);
-    assert!(message.contains("file/report") && message.contains("--out"), "{message}");
+    assert!(message.contains("file/report") && message.contains("--output"), "{message}");
     let export = ["--shapes", "1", "--clean-only", "--export-pairs", "none/pairs.npz"];
     let message = refusal(folder.path(), &export);
     assert!(message.contains("none/pairs.npz") && message.contains("--export-pairs"), "{message}");

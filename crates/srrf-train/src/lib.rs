@@ -4,6 +4,7 @@
 pub mod ahead;
 pub mod baseline;
 pub mod checkpoint;
+pub mod cli;
 pub mod config;
 pub mod data;
 pub mod log;

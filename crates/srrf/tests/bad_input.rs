@@ -80,7 +80,8 @@ fn options_that_make_no_sense() {
     if cfg!(not(feature = "rerun")) {
         says(&register(&["--rrd", "out.rrd"]), 2, &["--rrd", "--features rerun", "--html"]);
     }
-    says(&register(&["--threads", "0"]), 2, &["at least one thread"]);
+    says(&register(&["--threads", "0"]), 2, &["--threads <N>", "from 1 to 4,096"]);
+    says(&register(&["--seed", "-1"]), 2, &["--seed <N>", "a whole number from 0 to"]);
     says(&register(&["--format-source", "pcd"]), 2, &["source.ply", "streams only"]);
     for bad in [&["--method", "magic"][..], &["--rotation", "90"], &["--seed", "-1"], &["--nonsense"]] {
         let done = register(bad);

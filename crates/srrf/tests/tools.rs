@@ -35,7 +35,18 @@ fn corrupt_is_seeded() {
     let scene = Scene::new(600);
     let run = |out: &str, seed: &str| {
         scene
-            .srrf(&["corrupt", "source.ply", out, "--type", "background", "--severity", "5", "--seed", seed])
+            .srrf(&[
+                "corrupt",
+                "source.ply",
+                "-o",
+                out,
+                "-c",
+                "background",
+                "--severity",
+                "5",
+                "--seed",
+                seed,
+            ])
             .ok();
         std::fs::read(scene.path(out)).unwrap()
     };
@@ -43,7 +54,10 @@ fn corrupt_is_seeded() {
     assert_eq!(first, run("b.ply", "1"));
     assert_ne!(first, run("c.ply", "2"));
     assert!(read_cloud(&scene.path("a.ply")).unwrap().len() > 600);
-    let done = scene.srrf(&["corrupt", "source.ply", "d.ply", "--type", "rain"]);
+    // As it was written before.
+    scene.srrf(&["corrupt", "source.ply", "d.ply", "--type", "background", "-s", "5", "--seed", "1"]).ok();
+    assert_eq!(first, std::fs::read(scene.path("d.ply")).unwrap());
+    let done = scene.srrf(&["corrupt", "source.ply", "e.ply", "--type", "rain"]);
     assert!(done.code == 2 && done.err.contains("cutout"), "{done:?}");
 }
 

@@ -36,7 +36,7 @@ pub struct SheetArgs {
         long,
         value_name = value::NUMBER,
         default_value_t = 1024,
-        value_parser = whole(32, 100_000),
+        value_parser = whole(32usize, 100_000),
         allow_negative_numbers = true,
         help = help::POINTS,
         long_help = format!("{}\n\nLarger clouds are thinned to so many", help::POINTS)

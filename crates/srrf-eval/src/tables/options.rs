@@ -18,9 +18,11 @@ use crate::cli::{OF_BASELINES, TEST_SPLIT, weights_by_method};
 #[derive(Debug, Clone, Args)]
 #[command(after_help = EXAMPLES)]
 pub struct TablesOptions {
+    /// Path of the data, where one was given.
     #[arg(long, value_name = value::PATH, help = help::DATA, long_help = format!("{}\n\n{TEST_SPLIT}", help::DATA))]
     pub data: Option<PathBuf>,
 
+    /// Number of shapes.
     #[arg(
         long,
         value_name = value::NUMBER,
@@ -31,9 +33,11 @@ pub struct TablesOptions {
     )]
     pub shapes: Option<usize>,
 
+    /// Whether each shape is shown at one severity only.
     #[arg(long, help = help::SPREAD, long_help = format!("{}\n\n{SPREAD_TABLES}", help::SPREAD))]
     pub spread: bool,
 
+    /// Rows of the tables.
     #[arg(
         long,
         value_name = value::NAMES,
@@ -48,6 +52,7 @@ pub struct TablesOptions {
     #[arg(long, value_name = value::NAMES, value_delimiter = ',', value_parser = PARTS)]
     pub parts: Vec<String>,
 
+    /// Name or file of the weights, where one was given.
     #[arg(
         long,
         value_name = value::WEIGHTS,
@@ -76,6 +81,7 @@ pub struct TablesOptions {
     #[arg(long, value_name = "NAME=PATH", value_parser = named_weights)]
     pub variant: Vec<(String, PathBuf)>,
 
+    /// The seed.
     #[arg(
         long,
         value_name = value::NUMBER,
@@ -86,6 +92,7 @@ pub struct TablesOptions {
     )]
     pub seed: u64,
 
+    /// Points of each cloud.
     #[arg(
         long,
         value_name = value::NUMBER,
@@ -96,9 +103,11 @@ pub struct TablesOptions {
     )]
     pub points: usize,
 
+    /// Name of the device.
     #[arg(long, value_name = value::DEVICE, default_value = "flex", help = help::DEVICE)]
     pub device: String,
 
+    /// Worker threads, where they were given.
     #[arg(
         long,
         value_name = value::NUMBER,

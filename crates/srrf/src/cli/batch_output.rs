@@ -52,7 +52,7 @@ impl Results {
         let whole = text.iter().rposition(|b| *b == b'\n').map_or(0, |end| end + 1);
         let done = finished(&text[..whole], rows, options).map_err(|(line, problem)| {
             Failure::usage(format!(
-                "{path:?}, line {line}: {problem}; choose another --out, or delete this file"
+                "{path:?}, line {line}: {problem}; choose another --output, or delete this file"
             ))
         })?;
         if whole < text.len() {

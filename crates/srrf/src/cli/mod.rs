@@ -21,8 +21,6 @@ mod transform;
 mod view;
 mod weights;
 
-use failure::Failure;
-
 /// The exit codes, for help texts.
 const EXIT_CODES: &str = "Exit codes:
   0    done; with `register`: a pose was found and is probably right
