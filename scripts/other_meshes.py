@@ -156,7 +156,7 @@ def main():
     parser.add_argument("--meshes", type=int, default=40)
     parser.add_argument("--wheels", nargs="+", default=WHEELS)
     parser.add_argument("--voxel", type=float, default=0.06, help="of Open3D; the clouds have a radius of about 0.6")
-    parser.add_argument("--rotation", choices=["45", "180"], default="180", help="what srrf is told of the rotation")
+    parser.add_argument("--rotation", choices=["45", "so3"], default="so3", help="what srrf is told of the rotation")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--book", type=pathlib.Path, metavar="DIR", help="write other-meshes.md and other-meshes.json here")
     arguments = parser.parse_args()
