@@ -9,7 +9,7 @@ use burn::tensor::{Device, Tensor};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::ops::even_tokens;
-use srrf_model::{NetworkConfig, WrongSize, procrustes, registration_loss, soft_matches};
+use srrf_model::{CopyError, NetworkConfig, WrongSize, procrustes, registration_loss, soft_matches};
 
 use crate::dgcnn::{Dgcnn, halves};
 use crate::learned::{LearnedConfig, Lesson, Pose};
@@ -109,10 +109,10 @@ impl NetworkConfig for DcpConfig {
 }
 
 impl DcpConfig {
-    fn forward(&self, network: &Dcp, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Pose {
+    fn forward(&self, network: &Dcp, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Result<Pose, CopyError> {
         let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
-        let tokens = even_tokens(clouds.clone(), self.tokens, phase); // [2 batch, n, 3]
-        let (features, _) = network.embedding.forward(&tokens, &clouds); // [2 batch, n, width]
+        let tokens = even_tokens(clouds.clone(), self.tokens, phase)?; // [2 batch, n, 3]
+        let (features, _) = network.embedding.forward(&tokens, &clouds)?; // [2 batch, n, width]
         // v2: F + phi(F, other). v1 adds F itself, which doubles it.
         let change =
             network.transformer.as_ref().map_or_else(|| features.clone(), |t| t.forward(features.clone()));
@@ -121,8 +121,8 @@ impl DcpConfig {
         let (source_points, target_points) = halves(tokens);
         let scores = source_features.matmul(target_features.transpose()) / (width as f64).sqrt();
         let matches = soft_matches(scores, target_points);
-        let (rotation, translation) = procrustes(source_points, matches.points);
-        Pose { rotation, translation }
+        let (rotation, translation) = procrustes(source_points, matches.points)?;
+        Ok(Pose { rotation, translation })
     }
 }
 
@@ -136,14 +136,14 @@ impl LearnedConfig for DcpConfig {
         losses: &DcpLosses,
         network: &Dcp,
         lesson: &Lesson,
-    ) -> Vec<(&'static str, Tensor<1>, f64)> {
-        let found = self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase);
+    ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError> {
+        let found = self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase)?;
         let (rotation, translation) = (lesson.rotation.clone(), lesson.translation.clone());
         let loss = registration_loss(found.rotation, found.translation, rotation, translation);
-        vec![("registration", loss, losses.registration)]
+        Ok(vec![("registration", loss, losses.registration)])
     }
 
-    fn pose(&self, network: &Dcp, source: Tensor<3>, target: Tensor<3>) -> Pose {
+    fn pose(&self, network: &Dcp, source: Tensor<3>, target: Tensor<3>) -> Result<Pose, CopyError> {
         self.forward(network, source, target, 0.5)
     }
 }

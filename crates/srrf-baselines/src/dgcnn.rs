@@ -6,7 +6,7 @@ use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
 use srrf_model::GroupNorm;
 use srrf_model::fast::{Activation, gather_max, linear};
-use srrf_model::ops::{HostClouds, flat_indices, k_nearest, rows};
+use srrf_model::ops::{CopyError, HostClouds, flat_indices, k_nearest, rows};
 
 /// Groups of each norm, as in RPMNet.
 pub(crate) const GROUPS: usize = 8;
@@ -41,14 +41,14 @@ impl Block {
 /// # Shapes
 /// - `tokens`: `[clouds, n, 3]`, `cloud`: `[clouds, points, 3]`
 /// - output: `[clouds * n * k, 6]`
-pub(crate) fn edges(tokens: &Tensor<3>, cloud: &Tensor<3>, k: usize) -> Tensor<2> {
+pub(crate) fn edges(tokens: &Tensor<3>, cloud: &Tensor<3>, k: usize) -> Result<Tensor<2>, CopyError> {
     let ([clouds, n, _], [_, points, _]) = (tokens.dims(), cloud.dims());
-    let (host_tokens, host_cloud) = (HostClouds::read(tokens), HostClouds::read(cloud));
+    let (host_tokens, host_cloud) = (HostClouds::read(tokens)?, HostClouds::read(cloud)?);
     let supports: Vec<_> = host_cloud.iter().collect();
     let neighbours = flat_indices(&host_tokens, points, |i, tokens| k_nearest(tokens, supports[i], k));
     let neighbours = rows(cloud.clone().reshape([clouds * points, 3]), &neighbours);
     let centres = tokens.clone().reshape([clouds * n, 1, 3]).repeat_dim(1, k).reshape([clouds * n * k, 3]);
-    Tensor::cat(vec![neighbours, centres], 1)
+    Ok(Tensor::cat(vec![neighbours, centres], 1))
 }
 
 /// The maximum over each `k` rows in turn: `[n * k, channels]` to `[n, channels]`.
@@ -82,9 +82,13 @@ impl Dgcnn {
     /// # Shapes
     /// - `tokens`: `[clouds, n, 3]`, `cloud`: `[clouds, points, 3]`
     /// - output: `[clouds, n, width]` and `[clouds, n, sum of widths]`
-    pub fn forward(&self, tokens: &Tensor<3>, cloud: &Tensor<3>) -> (Tensor<3>, Tensor<3>) {
+    pub fn forward(
+        &self,
+        tokens: &Tensor<3>,
+        cloud: &Tensor<3>,
+    ) -> Result<(Tensor<3>, Tensor<3>), CopyError> {
         let [clouds, n, _] = tokens.dims();
-        let mut x = edges(tokens, cloud, self.neighbours);
+        let mut x = edges(tokens, cloud, self.neighbours)?;
         let mut levels = Vec::with_capacity(self.layers.len());
         for layer in &self.layers {
             x = layer.forward(x, clouds);
@@ -96,7 +100,7 @@ impl Dgcnn {
             let [_, width] = x.dims();
             x.reshape([clouds, n, width])
         };
-        (cloudwise(features), cloudwise(levels))
+        Ok((cloudwise(features), cloudwise(levels)))
     }
 }
 

@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use srrf_cloud::{Register, RegisterError, Registration, Solid};
 use srrf_model::weights::LoadedModel;
-use srrf_model::{NetworkConfig, PairBatch, subsample};
+use srrf_model::{CopyError, NetworkConfig, PairBatch, subsample};
 
 /// Largest number of points that a network sees of a cloud: what it was trained with.
 const MAX_POINTS: usize = 1024;
@@ -49,18 +49,24 @@ pub trait LearnedConfig: NetworkConfig + JsonSchema {
 
     /// The losses on some pairs, each of shape `[1]`, with their weights; one of weight 0 is only
     /// reported.
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
     fn losses(
         &self,
         losses: &Self::Losses,
         network: &Self::Network,
         lesson: &Lesson,
-    ) -> Vec<(&'static str, Tensor<1>, f64)>;
+    ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError>;
 
     /// The answer, as at inference.
     ///
     /// # Shapes
     /// - `source`, `target`: `[batch, points, 3]`, centred
-    fn pose(&self, network: &Self::Network, source: Tensor<3>, target: Tensor<3>) -> Pose;
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
+    fn pose(&self, network: &Self::Network, source: Tensor<3>, target: Tensor<3>) -> Result<Pose, CopyError>;
 
     /// How often the pose is refined within one answer.
     fn passes(&self) -> usize {
@@ -93,8 +99,8 @@ impl<C: LearnedConfig> Register for LearnedRegister<C> {
         let no_pose = |why: &str| RegisterError::NoPose(why.into());
         let batch = PairBatch::new(&[(&source, &target)], &self.device)
             .ok_or_else(|| no_pose("the clouds differ in their number of points"))?;
-        let pose = self.config.pose(&self.network, batch.source.clone(), batch.target.clone());
-        let found = batch.poses(&pose.rotation, &pose.translation).pop().flatten();
+        let pose = self.config.pose(&self.network, batch.source.clone(), batch.target.clone())?;
+        let found = batch.poses(&pose.rotation, &pose.translation)?.pop().flatten();
         let found = found
             .ok_or_else(|| no_pose("the network's output is not finite; are the coordinates extreme?"))?;
         Ok(Registration { iterations: self.config.passes(), ..Registration::from_pose(found) })

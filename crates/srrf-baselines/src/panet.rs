@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
 use srrf_model::ops::{HostClouds, even_tokens, flat_indices, k_nearest, rows};
-use srrf_model::{NetworkConfig, WrongSize, transform};
+use srrf_model::{CopyError, NetworkConfig, WrongSize, transform};
 
 use crate::dgcnn::{Block, max_over};
 use crate::learned::{LearnedConfig, Lesson, Pose};
@@ -147,14 +147,14 @@ impl NetworkConfig for PanetConfig {
 
 impl PanetConfig {
     /// The neighbours of the tokens of each cloud at the largest scale: `[clouds, n * k, 3]`.
-    fn neighbourhoods(&self, clouds: Tensor<3>, phase: f32) -> Tensor<3> {
-        let tokens = even_tokens(clouds.clone(), self.tokens, phase);
+    fn neighbourhoods(&self, clouds: Tensor<3>, phase: f32) -> Result<Tensor<3>, CopyError> {
+        let tokens = even_tokens(clouds.clone(), self.tokens, phase)?;
         let ([count, points, _], [_, n, _]) = (clouds.dims(), tokens.dims());
-        let (host_tokens, host) = (HostClouds::read(&tokens), HostClouds::read(&clouds));
+        let (host_tokens, host) = (HostClouds::read(&tokens)?, HostClouds::read(&clouds)?);
         let supports: Vec<_> = host.iter().collect();
         let k = self.scales[0];
         let found = flat_indices(&host_tokens, points, |i, tokens| k_nearest(tokens, supports[i], k));
-        rows(clouds.reshape([count * points, 3]), &found).reshape([count, n * k, 3])
+        Ok(rows(clouds.reshape([count * points, 3]), &found).reshape([count, n * k, 3]))
     }
 
     /// The global feature of each cloud: `[clouds, n * k, 3]` to `[clouds, width]`.
@@ -177,9 +177,9 @@ impl PanetConfig {
         max_over(network.joint.forward(Tensor::cat(levels, 1), clouds), n)
     }
 
-    fn forward(&self, network: &Panet, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Pose {
-        let target = self.encode(network, self.neighbourhoods(target, phase));
-        let source = self.neighbourhoods(source, phase);
+    fn forward(&self, network: &Panet, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Result<Pose, CopyError> {
+        let target = self.encode(network, self.neighbourhoods(target, phase)?);
+        let source = self.neighbourhoods(source, phase)?;
         let mut found: Option<(Tensor<3>, Tensor<2>)> = None;
         for _ in 0..self.iterations {
             // A motion leaves the neighbours what they are.
@@ -202,7 +202,7 @@ impl PanetConfig {
             let [batch, _, _] = source.dims();
             (crate::se3::identity(batch, 3, &source), Tensor::zeros([batch, 3], &source.device()))
         });
-        Pose { rotation, translation }
+        Ok(Pose { rotation, translation })
     }
 }
 
@@ -216,15 +216,15 @@ impl LearnedConfig for PanetConfig {
         losses: &PanetLosses,
         network: &Panet,
         lesson: &Lesson,
-    ) -> Vec<(&'static str, Tensor<1>, f64)> {
+    ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError> {
         let Pose { rotation, translation } =
-            self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase);
+            self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase)?;
         let found = transform(lesson.source.clone(), rotation, translation);
         let wanted = transform(lesson.source.clone(), lesson.rotation.clone(), lesson.translation.clone());
-        vec![("points", (found - wanted).abs().mean(), losses.points)]
+        Ok(vec![("points", (found - wanted).abs().mean(), losses.points)])
     }
 
-    fn pose(&self, network: &Panet, source: Tensor<3>, target: Tensor<3>) -> Pose {
+    fn pose(&self, network: &Panet, source: Tensor<3>, target: Tensor<3>) -> Result<Pose, CopyError> {
         self.forward(network, source, target, 0.5)
     }
 

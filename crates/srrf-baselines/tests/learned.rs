@@ -124,19 +124,20 @@ fn answers<C: LearnedConfig>(config: &C) {
     config.check().unwrap();
     let network = init::seeded(config.init(&device), 3);
     let Lesson { source, target, .. } = lesson(&device);
-    let pose = config.pose(&network, source.clone(), target.clone());
+    let pose = config.pose(&network, source.clone(), target.clone()).unwrap();
     assert_eq!((pose.rotation.dims(), pose.translation.dims()), ([3, 3, 3], [3, 3]));
     let square = pose.rotation.clone().matmul(pose.rotation.clone().transpose());
     for (i, v) in values(&square).iter().enumerate() {
         assert!((v - f64::from(i % 9 % 4 == 0)).abs() < 1e-3, "{}: {v} at {i}", C::NAME);
     }
-    let alone = config.pose(&network, source.clone().narrow(0, 1, 1), target.clone().narrow(0, 1, 1));
+    let alone =
+        config.pose(&network, source.clone().narrow(0, 1, 1), target.clone().narrow(0, 1, 1)).unwrap();
     let together = values(&pose.rotation.clone().narrow(0, 1, 1));
     assert!(largest_difference(&values(&alone.rotation), &together) < 1e-4, "{}", C::NAME);
 
     let order: Vec<i64> = (0..POINTS).map(|k| ((k * 40 + 11) % POINTS) as i64).collect();
     let order = Tensor::from_data(TensorData::new(order, [POINTS]), &device);
-    let shuffled = config.pose(&network, source.select(1, order), target);
+    let shuffled = config.pose(&network, source.select(1, order), target).unwrap();
     let apart = largest_difference(&values(&shuffled.rotation), &values(&pose.rotation));
     assert!(apart < 2e-3, "{}: {apart}", C::NAME);
 }
@@ -150,7 +151,7 @@ fn learns<C: LearnedConfig>((config, losses): &(C, C::Losses), rate: f64, steps:
     let mut course = Vec::new();
     for _ in 0..steps {
         let learning = network.train();
-        let terms = config.losses(losses, &learning, &lesson);
+        let terms = config.losses(losses, &learning, &lesson).unwrap();
         assert_eq!(terms.iter().map(|t| t.0).collect::<Vec<_>>(), C::TERMS);
         let total = terms.into_iter().map(|(_, value, weight)| value * weight).reduce(|a, b| a + b).unwrap();
         course.push(total.clone().into_scalar::<f64>());
@@ -210,7 +211,7 @@ fn pointnetlk_with_both_jacobians() {
         let device = Device::flex();
         let source = lesson(&device).source;
         let network = init::seeded(both.0.init(&device), 3);
-        let pose = both.0.pose(&network, source.clone(), source);
+        let pose = both.0.pose(&network, source.clone(), source).unwrap();
         assert!(values(&pose.translation).iter().all(|v| v.abs() < 1e-6));
     }
 }
@@ -246,8 +247,8 @@ fn equi_gspr_style() {
     let turn: Vec<f64> = turn.transpose().iter().copied().collect();
     let turn = Tensor::<3>::from_data(TensorData::new(turn, [1, 3, 3]), &device).repeat_dim(0, 3);
     let turned = source.clone().matmul(turn.clone().transpose());
-    let before = both.0.pose(&network, source, target.clone());
-    let after = both.0.pose(&network, turned, target);
+    let before = both.0.pose(&network, source, target.clone()).unwrap();
+    let after = both.0.pose(&network, turned, target).unwrap();
     let apart = largest_difference(&values(&after.rotation.matmul(turn)), &values(&before.rotation));
     assert!(apart < 1e-2, "{apart}");
 }

@@ -131,12 +131,12 @@ fn holds<C: LearnedConfig>(name: &str, losses: &str, types: [(DType, f64, f64); 
     for reference in types.map(Reference::new) {
         let (config, network) = reference.network::<C>(name);
         let lesson = reference.lesson();
-        let pose = config.pose(&network, lesson.source.clone(), lesson.target.clone());
+        let pose = config.pose(&network, lesson.source.clone(), lesson.target.clone()).unwrap();
         reference.compare_pose(name, &pose);
         let weights = serde_json::from_value(reference.all["losses"][losses].clone()).unwrap();
         let network = network.train();
         let mut total = None;
-        for (term, value, weight) in config.losses(&weights, &network, &lesson) {
+        for (term, value, weight) in config.losses(&weights, &network, &lesson).unwrap() {
             reference.compare(&format!("{name}.loss.{term}"), &value);
             let value = value * weight;
             total = Some(total.map_or(value.clone(), |sum: Tensor<1>| sum + value));
@@ -196,9 +196,9 @@ fn equi_gspr_from_given_matches() {
             source_features: descriptors(drawn[..count].to_vec()),
             target_features: descriptors(noisy),
         };
-        reference.compare_pose("equi_gspr", &config.pose_of(&network, matches.clone()));
+        reference.compare_pose("equi_gspr", &config.pose_of(&network, matches.clone()).unwrap());
         let network = network.train();
-        let pose = config.pose_of(&network, matches);
+        let pose = config.pose_of(&network, matches).unwrap();
         let loss = (pose.rotation * lesson.rotation).sum() + pose.translation.sum();
         reference.compare_gradients("equi_gspr", &network, loss);
     }

@@ -11,6 +11,9 @@ pub enum RegisterError {
     /// The target cloud cannot be used.
     #[error("target: {0}")]
     Target(#[source] CloudError),
+    /// The device that the method runs on did not give its numbers.
+    #[error("{0}")]
+    Device(#[source] Box<dyn std::error::Error + Send + Sync>),
     /// The method ran and found no pose.
     #[error("no pose found: {0}")]
     NoPose(String),

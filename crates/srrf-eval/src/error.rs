@@ -27,6 +27,9 @@ pub enum EvalError {
     /// A shape cannot be read.
     #[error("{0}")]
     Shape(#[from] SourceError),
+    /// A device did not give its numbers.
+    #[error(transparent)]
+    Copy(#[from] srrf_model::CopyError),
     /// A pair cannot be made.
     #[error("pair {item} of {group}: {problem}")]
     Pair {

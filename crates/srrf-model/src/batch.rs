@@ -4,7 +4,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use nalgebra::{Matrix3, Vector3};
 use srrf_cloud::{PairFrame, PointCloud, Rigid};
 
-use crate::ops::HostClouds;
+use crate::ops::{CopyError, HostClouds, to_host};
 
 /// Root mean square radius that clouds have inside the network. Clouds of ModelNet40 in the unit
 /// sphere have about this one, so thresholds in network units read as shares of the radius.
@@ -92,10 +92,18 @@ impl PairBatch {
     ///
     /// # Shapes
     /// - `rotation`: `[batch, 3, 3]`, `translation`: `[batch, 3]`
-    pub fn poses(&self, rotation: &Tensor<3>, translation: &Tensor<2>) -> Vec<Option<Rigid>> {
-        let rotations = rotation.try_to_vec_as::<f64>().unwrap_or_default();
-        let translations = translation.try_to_vec_as::<f64>().unwrap_or_default();
-        self.frames
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
+    pub fn poses(
+        &self,
+        rotation: &Tensor<3>,
+        translation: &Tensor<2>,
+    ) -> Result<Vec<Option<Rigid>>, CopyError> {
+        let rotations: Vec<f64> = to_host(rotation)?;
+        let translations: Vec<f64> = to_host(translation)?;
+        let poses = self
+            .frames
             .iter()
             .zip(rotations.chunks_exact(9).zip(translations.chunks_exact(3)))
             .map(|(frame, (r, t))| {
@@ -105,6 +113,7 @@ impl PairBatch {
                 // Clouds whose coordinates overflow have no scale either.
                 pose.translation.iter().all(|v| v.is_finite()).then_some(pose)
             })
-            .collect()
+            .collect();
+        Ok(poses)
     }
 }

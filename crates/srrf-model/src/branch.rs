@@ -10,7 +10,7 @@ use crate::confidence::Confidence;
 use crate::inference::Matches;
 use crate::integration::BranchPose;
 use crate::matching::{MatchingConfig, SoftMatching};
-use crate::ops::{HostClouds, RowNumbers, rows_at, token_rows};
+use crate::ops::{CopyError, HostClouds, RowNumbers, rows_at, token_rows};
 use crate::pfi::{Pfi, PfiConfig};
 use crate::prior::PositionPrior;
 use crate::procrustes::{procrustes, weighted_procrustes};
@@ -147,9 +147,17 @@ impl Branch {
     ///
     /// # Shapes
     /// - `source`, `target`: `[batch, points, 3]`, of equal numbers of points
-    pub fn forward(&self, source: Tensor<3>, target: Tensor<3>, phase: f32) -> BranchOutput {
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
+    pub fn forward(
+        &self,
+        source: Tensor<3>,
+        target: Tensor<3>,
+        phase: f32,
+    ) -> Result<BranchOutput, CopyError> {
         let clouds = Tensor::cat(vec![source, target], 0);
-        let layout = self.layout(&HostClouds::read(&clouds), phase);
+        let layout = self.layout(&HostClouds::read(&clouds)?, phase);
         self.forward_with(clouds, &layout, None)
     }
 
@@ -162,12 +170,15 @@ impl Branch {
     ///
     /// # Shapes
     /// - `clouds`: `[2 batch, points, 3]`, sources and then targets
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
     pub fn forward_with(
         &self,
         clouds: Tensor<3>,
         layout: &BranchLayout,
         prior: Option<&PositionPrior>,
-    ) -> BranchOutput {
+    ) -> Result<BranchOutput, CopyError> {
         let [both, points, _] = clouds.dims();
         let (batch, n) = (both / 2, layout.per_cloud);
         let tokens = match &layout.tokens {
@@ -191,8 +202,8 @@ impl Branch {
             timed("svd", &device, || match self.weights(phi(0), matches.matched.clone()) {
                 Some(weights) => weighted_procrustes(source_points.clone(), matches.points.clone(), weights),
                 None => procrustes(source_points.clone(), matches.points.clone()),
-            });
-        BranchOutput {
+            })?;
+        Ok(BranchOutput {
             rotation,
             translation,
             source_points,
@@ -200,7 +211,7 @@ impl Branch {
             matches: matches.points,
             probabilities: matches.probabilities,
             matched: matches.matched,
-        }
+        })
     }
 
     /// How much each source point counts: by its confidence and by its probability to have a match; sums to 1. None

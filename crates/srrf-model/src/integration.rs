@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::defaults;
-use crate::ops::{HostClouds, share_within};
+use crate::ops::{CopyError, HostClouds, share_within};
 use crate::procrustes::{nearest_rotation, transform};
 
 /// Which points the inlier test of a branch looks at.
@@ -91,31 +91,34 @@ impl IntegrationConfig {
     ///
     /// # Shapes
     /// - `source`, `target`: `[batch, points, 3]`
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
     pub fn fuse(
         &self,
         dense: BranchPose<'_>,
         skeleton: BranchPose<'_>,
         source: &Tensor<3>,
         target: &Tensor<3>,
-    ) -> Fusion {
+    ) -> Result<Fusion, CopyError> {
         let near = |branch: &BranchPose<'_>, threshold| self.near(branch, threshold, source, target);
         let (dense_inlier_ratio, skeleton_inlier_ratio, ahead) = match self.test {
             InlierTest::SoftMatch => {
                 let (c, s) = (
-                    agreeing(&dense, &dense, self.dense_threshold),
-                    agreeing(&skeleton, &skeleton, self.skeleton_threshold),
+                    agreeing(&dense, &dense, self.dense_threshold)?,
+                    agreeing(&skeleton, &skeleton, self.skeleton_threshold)?,
                 );
                 (shares(&c), shares(&s), None)
             }
             InlierTest::Common => {
                 let (c, s) = (
-                    agreeing(&dense, &dense, self.dense_threshold),
-                    agreeing(&dense, &skeleton, self.dense_threshold),
+                    agreeing(&dense, &dense, self.dense_threshold)?,
+                    agreeing(&dense, &skeleton, self.dense_threshold)?,
                 );
                 (shares(&c), shares(&s), Some(standard_errors_ahead(&s, &c)))
             }
             InlierTest::Nearest | InlierTest::BothWays => {
-                (near(&dense, self.dense_threshold), near(&skeleton, self.skeleton_threshold), None)
+                (near(&dense, self.dense_threshold)?, near(&skeleton, self.skeleton_threshold)?, None)
             }
         };
         let lambda: Vec<f64> = match (self.standard_errors, ahead) {
@@ -137,9 +140,9 @@ impl IntegrationConfig {
         let rotation =
             blend(dense.rotation.clone().reshape([batch, 9]), skeleton.rotation.clone().reshape([batch, 9]));
         // The projection is the exact weighted chordal mean of the two rotations.
-        let rotation = nearest_rotation(rotation.reshape([batch, 3, 3]));
+        let rotation = nearest_rotation(rotation.reshape([batch, 3, 3]))?;
         let translation = blend(dense.translation.clone(), skeleton.translation.clone());
-        Fusion { rotation, translation, dense_inlier_ratio, skeleton_inlier_ratio, lambda }
+        Ok(Fusion { rotation, translation, dense_inlier_ratio, skeleton_inlier_ratio, lambda })
     }
 
     /// `gamma = N_inlier / N` of each pair: the share of the source points that the pose brings near the target, or the mean
@@ -150,35 +153,39 @@ impl IntegrationConfig {
         threshold: f64,
         source: &Tensor<3>,
         target: &Tensor<3>,
-    ) -> Vec<f64> {
-        let moved = pose.host_clouds(source);
-        let target = HostClouds::read(target);
+    ) -> Result<Vec<f64>, CopyError> {
+        let moved = pose.host_clouds(source)?;
+        let target = HostClouds::read(target)?;
         let clouds: Vec<_> = moved.iter().zip(target.iter()).collect();
         let share = |a, b| share_within(a, b, threshold as f32);
         let ratio = |(a, b): &(_, _)| match self.test {
             InlierTest::BothWays => 0.5 * (share(*a, *b) + share(*b, *a)),
             _ => share(*a, *b),
         };
-        clouds.par_iter().map(ratio).collect()
+        Ok(clouds.par_iter().map(ratio).collect())
     }
 }
 
 impl BranchPose<'_> {
     /// `points` moved by the pose.
-    fn host_clouds(&self, points: &Tensor<3>) -> HostClouds {
+    fn host_clouds(&self, points: &Tensor<3>) -> Result<HostClouds, CopyError> {
         let (rotation, translation) = (self.rotation.clone().detach(), self.translation.clone().detach());
         HostClouds::read(&transform(points.clone().detach(), rotation, translation))
     }
 }
 
 /// Of each correspondence of a branch, whether it agrees with a pose: `|R x_i + t - yhat_i| < threshold`.
-fn agreeing(branch: &BranchPose<'_>, pose: &BranchPose<'_>, threshold: f64) -> Vec<Vec<bool>> {
-    let moved = pose.host_clouds(branch.points);
-    let matches = HostClouds::read(&branch.matches.clone().detach());
+fn agreeing(
+    branch: &BranchPose<'_>,
+    pose: &BranchPose<'_>,
+    threshold: f64,
+) -> Result<Vec<Vec<bool>>, CopyError> {
+    let moved = pose.host_clouds(branch.points)?;
+    let matches = HostClouds::read(&branch.matches.clone().detach())?;
     let near = |(a, b): (&[f32; 3], &[f32; 3])| {
         (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>() < threshold * threshold
     };
-    moved.iter().zip(matches.iter()).map(|(a, b)| a.iter().zip(b).map(near).collect()).collect()
+    Ok(moved.iter().zip(matches.iter()).map(|(a, b)| a.iter().zip(b).map(near).collect()).collect())
 }
 
 /// The share of each pair's correspondences that agree.

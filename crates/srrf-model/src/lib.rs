@@ -49,7 +49,7 @@ pub use losses::{
 pub use matching::{MatchingConfig, Scaled, SoftMatches, SoftMatching, sinkhorn, soft_matches, standardised};
 pub use memory::keep_freed_memory;
 pub use norm::GroupNorm;
-pub use ops::nearest_distance;
+pub use ops::{CopyError, nearest_distance};
 pub use pfi::{Pfi, PfiConfig};
 pub use prior::PositionPrior;
 pub use procrustes::{nearest_rotation, procrustes, transform, weighted_procrustes};

@@ -16,6 +16,8 @@
 use burn::tensor::{Bool, Tensor, TensorData};
 use nalgebra::{Matrix3, SVD, Vector3};
 
+use crate::ops::{CopyError, to_host};
+
 /// Smallest `p_i + p_j`, as a share of the largest singular value.
 const MIN_GAP: f64 = 1e-3;
 /// Largest singular value that counts as zero: the inverse of `MIN_GAP` times it still fits `f32`.
@@ -29,10 +31,13 @@ const ZERO: f64 = 1e-30;
 /// # Shapes
 /// - `matrices`: `[batch, 3, 3]`
 /// - output: `[batch, 3, 3]`, det = +1
-pub fn nearest_rotation(matrices: Tensor<3>) -> Tensor<3> {
+///
+/// # Errors
+/// [`CopyError`] where the matrices cannot be copied to the host.
+pub fn nearest_rotation(matrices: Tensor<3>) -> Result<Tensor<3>, CopyError> {
     let [batch, _, _] = matrices.dims();
     let device = matrices.device().without_autodiff();
-    let values: Vec<f64> = matrices.try_to_vec_as::<f64>().unwrap_or_default();
+    let values: Vec<f64> = to_host(&matrices)?;
 
     let mut parts: [Vec<f64>; 5] = Default::default(); // R0, A D, D A^T, B, K
     let mut unsolved = Vec::with_capacity(batch * 9);
@@ -53,12 +58,12 @@ pub fn nearest_rotation(matrices: Tensor<3>) -> Tensor<3> {
     let turn = k * (n.clone() - n.transpose());
     let rotation = r0.clone() + ad.matmul(turn).matmul(b.transpose());
     if !unsolved.contains(&true) {
-        return rotation;
+        return Ok(rotation);
     }
     // The change of an unsolved matrix is NaN, not 0. Its factors turn any gradient into NaN, also
     // the 0 that comes back through the mask.
     let unsolved = Tensor::<3, Bool>::from_data(TensorData::new(unsolved, [batch, 3, 3]), &device);
-    rotation.mask_where(unsolved, r0)
+    Ok(rotation.mask_where(unsolved, r0))
 }
 
 /// The constants of one 3 x 3 problem.
@@ -91,14 +96,17 @@ impl Solved {
 /// # Shapes
 /// - `source`, `target`: `[batch, points, 3]`
 /// - output: rotation `[batch, 3, 3]` and translation `[batch, 3]`, `target ~ R source + t`
-pub fn procrustes(source: Tensor<3>, target: Tensor<3>) -> (Tensor<3>, Tensor<2>) {
+///
+/// # Errors
+/// [`CopyError`] where the cross-covariance cannot be copied to the host.
+pub fn procrustes(source: Tensor<3>, target: Tensor<3>) -> Result<(Tensor<3>, Tensor<2>), CopyError> {
     let source_mean = source.clone().mean_dim(1); // [batch, 1, 3], Eq. (2)
     let target_mean = target.clone().mean_dim(1);
     // Eq. (3), transposed, so that Eq. (4) reads R = A D B^T: M = sum (y - ybar)(x - xbar)^T.
     let cross = (target - target_mean.clone()).transpose().matmul(source - source_mean.clone());
-    let rotation = nearest_rotation(cross);
+    let rotation = nearest_rotation(cross)?;
     let translation = target_mean - source_mean.matmul(rotation.clone().transpose()); // Eq. (4)
-    (rotation, translation.squeeze_dim::<2>(1))
+    Ok((rotation, translation.squeeze_dim::<2>(1)))
 }
 
 /// As [`procrustes`], where the points count by `weights`, which sum to 1 in each cloud. Differentiable
@@ -107,19 +115,22 @@ pub fn procrustes(source: Tensor<3>, target: Tensor<3>) -> (Tensor<3>, Tensor<2>
 /// # Shapes
 /// - `source`, `target`: `[batch, points, 3]`, `weights`: `[batch, points, 1]`
 /// - output: rotation `[batch, 3, 3]` and translation `[batch, 3]`, `target ~ R source + t`
+///
+/// # Errors
+/// [`CopyError`] where the cross-covariance cannot be copied to the host.
 pub fn weighted_procrustes(
     source: Tensor<3>,
     target: Tensor<3>,
     weights: Tensor<3>,
-) -> (Tensor<3>, Tensor<2>) {
+) -> Result<(Tensor<3>, Tensor<2>), CopyError> {
     let [_, points, _] = weights.dims();
     let source_mean = (source.clone() * weights.clone()).sum_dim(1); // [batch, 1, 3]
     let target_mean = (target.clone() * weights.clone()).sum_dim(1);
     let weighted = (target - target_mean.clone()) * weights * points as f64; // as many as unweighted
     let cross = weighted.transpose().matmul(source - source_mean.clone());
-    let rotation = nearest_rotation(cross);
+    let rotation = nearest_rotation(cross)?;
     let translation = target_mean - source_mean.matmul(rotation.clone().transpose());
-    (rotation, translation.squeeze_dim::<2>(1))
+    Ok((rotation, translation.squeeze_dim::<2>(1)))
 }
 
 /// `R p + t` for each point.

@@ -11,7 +11,7 @@ use crate::batch::PairBatch;
 use crate::branch::BranchOutput;
 use crate::inference::InferenceConfig;
 use crate::integration::IntegrationConfig;
-use crate::ops::even_subsample;
+use crate::ops::{CopyError, even_subsample, to_host};
 use crate::prior::PositionPrior;
 use crate::sem;
 use crate::srrf::{BranchKind, Srrf};
@@ -75,28 +75,27 @@ impl SrrfRegister {
         model: &Srrf,
         pairs: &[(&PointCloud, &PointCloud)],
         placed: bool,
-    ) -> Vec<Option<Registration>> {
-        let Some(batch) = PairBatch::new(pairs, &self.device) else { return vec![None; pairs.len()] };
+    ) -> Result<Vec<Option<Registration>>, CopyError> {
+        let Some(batch) = PairBatch::new(pairs, &self.device) else { return Ok(vec![None; pairs.len()]) };
         let prior = self.prior.filter(|_| placed).map(|prior| PositionPrior::new(prior, &batch.frames));
         let (source, target) = (batch.source.clone(), batch.target.clone());
         if let Some(branch) = self.alone {
-            let found = model.alone(branch, source, target, PHASE, prior.as_ref());
-            let poses = batch.poses(&found.rotation, &found.translation).into_iter();
-            let matches = soft_matches(&found, &batch.frames);
-            return poses
-                .zip(matches)
-                .map(|(pose, matches)| Some(Registration { matches, ..Registration::from_pose(pose?) }))
-                .collect();
+            let found = model.alone(branch, source, target, PHASE, prior.as_ref())?;
+            let poses = batch.poses(&found.rotation, &found.translation)?.into_iter();
+            let answers = poses
+                .zip(soft_matches(&found, &batch.frames)?)
+                .map(|(pose, matches)| Some(Registration { matches, ..Registration::from_pose(pose?) }));
+            return Ok(answers.collect());
         }
-        let output = model.forward_near(&self.integration, source, target, PHASE, prior);
-        let fused = batch.poses(&output.fused.rotation, &output.fused.translation);
-        let dense = batch.poses(&output.dense.rotation, &output.dense.translation);
-        let skeleton = batch.poses(&output.skeleton.rotation, &output.skeleton.translation);
-        let source_skeletons = skeletons(&output.source_skeleton, &batch.frames, PairFrame::undo_source);
-        let target_skeletons = skeletons(&output.target_skeleton, &batch.frames, PairFrame::undo_target);
-        let matches = soft_matches(&output.dense, &batch.frames);
+        let output = model.forward_near(&self.integration, source, target, PHASE, prior)?;
+        let fused = batch.poses(&output.fused.rotation, &output.fused.translation)?;
+        let dense = batch.poses(&output.dense.rotation, &output.dense.translation)?;
+        let skeleton = batch.poses(&output.skeleton.rotation, &output.skeleton.translation)?;
+        let source_skeletons = skeletons(&output.source_skeleton, &batch.frames, PairFrame::undo_source)?;
+        let target_skeletons = skeletons(&output.target_skeleton, &batch.frames, PairFrame::undo_target)?;
+        let matches = soft_matches(&output.dense, &batch.frames)?;
         let found = source_skeletons.into_iter().zip(target_skeletons).zip(matches);
-        found
+        let answers = found
             .enumerate()
             .map(|(i, ((source, target), matches))| {
                 let branch = |name, pose: &[Option<Rigid>], ratio: &[f64]| {
@@ -113,7 +112,8 @@ impl SrrfRegister {
                     ..Registration::from_pose(fused[i]?)
                 })
             })
-            .collect()
+            .collect();
+        Ok(answers)
     }
 }
 
@@ -135,7 +135,7 @@ impl Register for SrrfRegister {
             let model = if pass == passes { &self.last } else { &self.model };
             let start = found.as_ref().map_or_else(Rigid::identity, |r| r.target_from_source);
             let moved = source.transformed(&start);
-            let answer = self.pass(model, &[(&moved, &target)], found.is_some()).pop().flatten();
+            let answer = self.pass(model, &[(&moved, &target)], found.is_some())?.pop().flatten();
             let answer = answer.ok_or_else(|| {
                 RegisterError::NoPose(
                     "the network's output is not finite; are the coordinates extreme?".into(),
@@ -154,23 +154,23 @@ fn skeletons(
     found: &sem::Skeleton,
     frames: &[PairFrame],
     undo: fn(&PairFrame, &[f64; 3]) -> [f64; 3],
-) -> Vec<Skeleton> {
+) -> Result<Vec<Skeleton>, CopyError> {
     let [_, s, _] = found.points.dims();
-    let radii = found.radii.try_to_vec_as::<f64>().unwrap_or_default();
-    let clouds = cloud_points(&found.points).into_iter().zip(radii.chunks(s.max(1)));
+    let radii: Vec<f64> = to_host(&found.radii)?;
+    let clouds = cloud_points(&found.points)?.into_iter().zip(radii.chunks(s.max(1)));
     let back = |(frame, (points, radii)): (&PairFrame, (Vec<[f64; 3]>, &[f64]))| Skeleton {
         points: points.iter().map(|p| undo(frame, p)).collect(),
         radii: radii.iter().map(|r| frame.undo_length(*r)).collect(),
     };
-    frames.iter().zip(clouds).map(back).collect()
+    Ok(frames.iter().zip(clouds).map(back).collect())
 }
 
 /// The soft matches `(x_i, yhat_i)` of a batch; the weight is the greatest probability in `m(x_i, Y)`, which is
 /// 1 where `yhat_i` is one target point.
-fn soft_matches(branch: &BranchOutput, frames: &[PairFrame]) -> Vec<Vec<SoftMatch>> {
+fn soft_matches(branch: &BranchOutput, frames: &[PairFrame]) -> Result<Vec<Vec<SoftMatch>>, CopyError> {
     let [_, n, _] = branch.matches.dims();
-    let weights = branch.probabilities.clone().max_dim(2).try_to_vec_as::<f64>().unwrap_or_default();
-    let (sources, targets) = (cloud_points(&branch.source_points), cloud_points(&branch.matches));
+    let weights: Vec<f64> = to_host(&branch.probabilities.clone().max_dim(2))?;
+    let (sources, targets) = (cloud_points(&branch.source_points)?, cloud_points(&branch.matches)?);
     let pairs = sources.iter().zip(&targets).zip(weights.chunks(n.max(1)));
     let of_pair = |(frame, ((source, target), weights)): (&PairFrame, ((&Vec<_>, &Vec<_>), &[f64]))| {
         let one = |((x, y), weight): ((&[f64; 3], &[f64; 3]), &f64)| SoftMatch {
@@ -180,15 +180,15 @@ fn soft_matches(branch: &BranchOutput, frames: &[PairFrame]) -> Vec<Vec<SoftMatc
         };
         source.iter().zip(target).zip(weights).map(one).collect()
     };
-    frames.iter().zip(pairs).map(of_pair).collect()
+    Ok(frames.iter().zip(pairs).map(of_pair).collect())
 }
 
 /// Points of each cloud of a batch, `[batch, points, 3]`, in `f64`.
-fn cloud_points(points: &Tensor<3>) -> Vec<Vec<[f64; 3]>> {
+fn cloud_points(points: &Tensor<3>) -> Result<Vec<Vec<[f64; 3]>>, CopyError> {
     let [_, n, _] = points.dims();
-    let flat = points.try_to_vec_as::<f64>().unwrap_or_default();
+    let flat: Vec<f64> = to_host(points)?;
     let points: Vec<[f64; 3]> = flat.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
-    points.chunks(n.max(1)).map(<[_]>::to_vec).collect()
+    Ok(points.chunks(n.max(1)).map(<[_]>::to_vec).collect())
 }
 
 /// `points` points of the cloud, evenly along a space-filling curve.

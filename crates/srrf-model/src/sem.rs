@@ -9,7 +9,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::fast::{Activation, gather_max, gather_relu, linear};
-use crate::ops::{HostClouds, farthest_points, flat_indices, k_nearest, nearest_distance, rows};
+use crate::ops::{CopyError, HostClouds, farthest_points, flat_indices, k_nearest, nearest_distance, rows};
 
 /// Sizes of one set-abstraction level.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -172,8 +172,11 @@ impl Sem {
     ///
     /// # Shapes
     /// - `clouds`: `[clouds, points, 3]`
-    pub fn forward(&self, clouds: Tensor<3>) -> Skeleton {
-        let layout = self.layout(&HostClouds::read(&clouds));
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
+    pub fn forward(&self, clouds: Tensor<3>) -> Result<Skeleton, CopyError> {
+        let layout = self.layout(&HostClouds::read(&clouds)?);
         self.forward_with(clouds, &layout)
     }
 
@@ -183,7 +186,10 @@ impl Sem {
     }
 
     /// As [`Sem::forward`], of clouds whose layout is known.
-    pub fn forward_with(&self, clouds: Tensor<3>, layout: &SemLayout) -> Skeleton {
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
+    pub fn forward_with(&self, clouds: Tensor<3>, layout: &SemLayout) -> Result<Skeleton, CopyError> {
         let (samples, features) = self.encode(clouds, layout);
         let [batch, n, channels] = features.dims();
 
@@ -203,9 +209,9 @@ impl Sem {
         let weights = softmax(logits.reshape([batch, n, skeleton_points]), 1); // sum_i W(i, j) = 1
 
         let points = weights.clone().transpose().matmul(samples.clone()); // S = W^T X*, Eq. (5)
-        let distances = nearest_distance(samples.clone(), points.clone()); // D, Eq. (6)
+        let distances = nearest_distance(samples.clone(), points.clone())?; // D, Eq. (6)
         let radii = weights.clone().transpose().matmul(distances.unsqueeze_dim::<3>(2)); // R = W^T D
-        Skeleton { points, radii: radii.squeeze_dim::<2>(2), weights, samples }
+        Ok(Skeleton { points, radii: radii.squeeze_dim::<2>(2), weights, samples })
     }
 
     /// The sampled points `X*` and their contextual features.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::attention::EncoderLayer;
 use crate::fast::{Activation, linear};
-use crate::ops::{HostClouds, RowNumbers, flat_indices, k_nearest, rows_at};
+use crate::ops::{CopyError, HostClouds, RowNumbers, flat_indices, k_nearest, rows_at};
 
 /// Sizes of the structural feature extractor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -119,10 +119,13 @@ impl Sfe {
     /// - `tokens`: `[clouds, n, 3]`, `cloud`: `[clouds, points, 3]` (the same tensor where every
     ///   point is a token)
     /// - output: `[clouds, n, layers * width]`
-    pub fn forward(&self, tokens: Tensor<3>, cloud: Tensor<3>) -> Tensor<3> {
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
+    pub fn forward(&self, tokens: Tensor<3>, cloud: Tensor<3>) -> Result<Tensor<3>, CopyError> {
         let [_, n, _] = tokens.dims();
-        let (tokens, host_cloud) = (HostClouds::read(&tokens), HostClouds::read(&cloud));
-        self.forward_with(cloud, n, &Neighbourhood::new(&tokens, &host_cloud, self.neighbours))
+        let (tokens, host_cloud) = (HostClouds::read(&tokens)?, HostClouds::read(&cloud)?);
+        Ok(self.forward_with(cloud, n, &Neighbourhood::new(&tokens, &host_cloud, self.neighbours)))
     }
 
     /// As [`Sfe::forward`], for `n` tokens a cloud of which it is known who their neighbours are.

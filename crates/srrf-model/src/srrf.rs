@@ -9,7 +9,7 @@ use srrf_cloud::profile::stage;
 use crate::branch::{Branch, BranchConfig, BranchLayout, BranchOutput};
 use crate::inference::InferenceConfig;
 use crate::integration::{Fusion, IntegrationConfig};
-use crate::ops::HostClouds;
+use crate::ops::{CopyError, HostClouds};
 use crate::prior::PositionPrior;
 use crate::sem::{Sem, SemConfig, SemLayout, Skeleton};
 use crate::timing::timed;
@@ -103,13 +103,16 @@ impl Srrf {
     ///
     /// # Shapes
     /// - `source`, `target`: `[batch, points, 3]`
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
     pub fn forward(
         &self,
         integration: &IntegrationConfig,
         source: Tensor<3>,
         target: Tensor<3>,
         phase: f32,
-    ) -> SrrfOutput {
+    ) -> Result<SrrfOutput, CopyError> {
         self.forward_near(integration, source, target, phase, None)
     }
 
@@ -117,6 +120,9 @@ impl Srrf {
     ///
     /// # Shapes
     /// - `source`, `target`: `[batch, points, 3]`
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
     pub fn forward_near(
         &self,
         integration: &IntegrationConfig,
@@ -124,17 +130,18 @@ impl Srrf {
         target: Tensor<3>,
         phase: f32,
         prior: Option<PositionPrior>,
-    ) -> SrrfOutput {
-        let layout = stage("layout", || {
-            let both = HostClouds::read(&Tensor::cat(vec![source.clone(), target.clone()], 0));
-            SrrfLayout { sem: self.sem.layout(&both), dense: self.dense.layout(&both, phase), phase, prior }
-        });
-        let (skeletons, skeleton, dense) = self.branches(source.clone(), target.clone(), &layout);
+    ) -> Result<SrrfOutput, CopyError> {
+        let layout = stage("layout", || -> Result<_, CopyError> {
+            let both = HostClouds::read(&Tensor::cat(vec![source.clone(), target.clone()], 0))?;
+            let (sem, dense) = (self.sem.layout(&both), self.dense.layout(&both, phase));
+            Ok(SrrfLayout { sem, dense, phase, prior })
+        })?;
+        let (skeletons, skeleton, dense) = self.branches(source.clone(), target.clone(), &layout)?;
         // (4) Integration: {R, t} = lambda {R_c, t_c} + (1 - lambda) {R_s, t_s}.
         let fused =
-            stage("integration", || integration.fuse(dense.pose(), skeleton.pose(), &source, &target));
+            stage("integration", || integration.fuse(dense.pose(), skeleton.pose(), &source, &target))?;
         let (source_skeleton, target_skeleton) = skeletons;
-        SrrfOutput { source_skeleton, target_skeleton, dense, skeleton, fused }
+        Ok(SrrfOutput { source_skeleton, target_skeleton, dense, skeleton, fused })
     }
 
     /// One branch without the other, with a prior on where matches lie in the passes after the first one: what the
@@ -142,6 +149,9 @@ impl Srrf {
     ///
     /// # Shapes
     /// - `source`, `target`: `[batch, points, 3]`
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
     pub fn alone(
         &self,
         which: BranchKind,
@@ -149,16 +159,16 @@ impl Srrf {
         target: Tensor<3>,
         phase: f32,
         prior: Option<&PositionPrior>,
-    ) -> BranchOutput {
+    ) -> Result<BranchOutput, CopyError> {
         let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
         let (branch, clouds) = match which {
             BranchKind::Dense => (&self.dense, clouds),
             BranchKind::Skeleton => {
-                let layout = self.sem.layout(&HostClouds::read(&clouds));
-                (&self.skeleton, self.sem.forward_with(clouds, &layout).detached_points())
+                let layout = self.sem.layout(&HostClouds::read(&clouds)?);
+                (&self.skeleton, self.sem.forward_with(clouds, &layout)?.detached_points())
             }
         };
-        let layout = branch.layout(&HostClouds::read(&clouds), phase);
+        let layout = branch.layout(&HostClouds::read(&clouds)?, phase);
         branch.forward_with(clouds, &layout, prior)
     }
 
@@ -167,21 +177,26 @@ impl Srrf {
     ///
     /// # Shapes
     /// - `source`, `target`: `[batch, points, 3]`
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
     pub fn branches(
         &self,
         source: Tensor<3>,
         target: Tensor<3>,
         layout: &SrrfLayout,
-    ) -> ((Skeleton, Skeleton), BranchOutput, BranchOutput) {
+    ) -> Result<((Skeleton, Skeleton), BranchOutput, BranchOutput), CopyError> {
         let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
         // (1) Skeletal extraction, Eq. (5) and (6).
-        let skeletons = timed("sem", &clouds.device(), || self.sem.forward_with(clouds.clone(), &layout.sem));
+        let skeletons =
+            timed("sem", &clouds.device(), || self.sem.forward_with(clouds.clone(), &layout.sem))?;
         // The gradient stop between SEM and registration.
         let stopped = skeletons.detached_points();
-        let on_skeletons =
-            stage("skeleton layout", || self.skeleton.layout(&HostClouds::read(&stopped), layout.phase));
-        let (skeleton, dense) = self.poses(stopped, &on_skeletons, clouds, layout);
-        (skeletons.halves(), skeleton, dense)
+        let on_skeletons = stage("skeleton layout", || -> Result<_, CopyError> {
+            Ok(self.skeleton.layout(&HostClouds::read(&stopped)?, layout.phase))
+        })?;
+        let (skeleton, dense) = self.poses(stopped, &on_skeletons, clouds, layout)?;
+        Ok((skeletons.halves(), skeleton, dense))
     }
 
     /// The registration, of clouds whose skeletons are known: what the skeleton branch found, and what the dense
@@ -189,18 +204,21 @@ impl Srrf {
     ///
     /// # Shapes
     /// - `skeletons`: `[2 batch, skeleton_points, 3]`, `clouds`: `[2 batch, points, 3]`, sources and then targets
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
     pub fn poses(
         &self,
         skeletons: Tensor<3>,
         on_skeletons: &BranchLayout,
         clouds: Tensor<3>,
         layout: &SrrfLayout,
-    ) -> (BranchOutput, BranchOutput) {
+    ) -> Result<(BranchOutput, BranchOutput), CopyError> {
         // (2, 3) Features, interaction, matching and SVD: {R_s, t_s} and {R_c, t_c}.
         let prior = layout.prior.as_ref();
         let skeleton =
-            stage("skeleton branch", || self.skeleton.forward_with(skeletons, on_skeletons, prior));
-        let dense = stage("dense branch", || self.dense.forward_with(clouds, &layout.dense, prior));
-        (skeleton, dense)
+            stage("skeleton branch", || self.skeleton.forward_with(skeletons, on_skeletons, prior))?;
+        let dense = stage("dense branch", || self.dense.forward_with(clouds, &layout.dense, prior))?;
+        Ok((skeleton, dense))
     }
 }

@@ -35,7 +35,7 @@ fn case() -> Case {
     let rotation = tensor(&rotations, [BATCH, 3, 3], &device);
     let translation = tensor(&numbers.many(BATCH * 3), [BATCH, 3], &device);
     let target = srrf_model::transform(source.clone(), rotation.clone(), translation.clone());
-    let output = model.forward(&config.integration, source.clone(), target.clone(), 0.5);
+    let output = model.forward(&config.integration, source.clone(), target.clone(), 0.5).unwrap();
     Case { model, output, source, target, rotation, translation }
 }
 
@@ -64,7 +64,7 @@ impl Case {
         };
         let source = (self.source.clone(), &self.output.source_skeleton);
         let target = (self.target.clone(), &self.output.target_skeleton);
-        skeleton_loss(&config, source, target, self.rotation.clone(), self.translation.clone()).total
+        skeleton_loss(&config, source, target, self.rotation.clone(), self.translation.clone()).unwrap().total
     }
 }
 
@@ -93,8 +93,8 @@ fn moved<M: Module>(module: &M, grads: &GradientsParams) -> Vec<String> {
 
 /// Parameters that one Adam step on these gradients changes.
 fn changed_by_a_step(model: &Srrf, grads: GradientsParams) -> Vec<String> {
-    let before = parameters(model);
-    let after = parameters(&AdamConfig::new().init().step(0.1, model.clone(), grads));
+    let before = parameters(model).unwrap();
+    let after = parameters(&AdamConfig::new().init().step(0.1, model.clone(), grads)).unwrap();
     before.into_iter().filter(|(name, values)| after[name] != *values).map(|(name, _)| name).collect()
 }
 
@@ -105,7 +105,7 @@ fn registration_loss_moves_no_parameter_of_the_skeleton_module() {
     assert_eq!(moved(&case.model.sem, &grads), [""; 0]);
     // Both branches learn: every parameter has a gradient, whatever its size.
     for (name, module) in [("dense", &case.model.dense), ("skeleton", &case.model.skeleton)] {
-        let (moved, all) = (moved(module, &grads), parameters(module));
+        let (moved, all) = (moved(module, &grads), parameters(module).unwrap());
         let still: Vec<_> = all.keys().filter(|name| !moved.contains(name)).collect();
         assert!(still.is_empty(), "{name}: {still:?}");
     }
@@ -119,7 +119,7 @@ fn skeleton_loss_moves_no_parameter_of_the_branches() {
     let grads = GradientsParams::from_grads(case.skeleton().backward(), &case.model);
     assert_eq!(moved(&case.model.dense, &grads), [""; 0]);
     assert_eq!(moved(&case.model.skeleton, &grads), [""; 0]);
-    let (moved, all) = (moved(&case.model.sem, &grads), parameters(&case.model.sem));
+    let (moved, all) = (moved(&case.model.sem, &grads), parameters(&case.model.sem).unwrap());
     let still: Vec<_> = all.keys().filter(|name| !moved.contains(name)).collect();
     assert!(still.is_empty(), "{still:?}");
     let changed = changed_by_a_step(&case.model, grads);

@@ -14,7 +14,7 @@ const POINTS: usize = 61;
 fn forward(source: &Tensor<3>, target: &Tensor<3>) -> SrrfOutput {
     let config = tiny();
     let model = init::seeded(config.init(&Device::flex()), 1);
-    model.forward(&config.integration, source.clone(), target.clone(), 0.5)
+    model.forward(&config.integration, source.clone(), target.clone(), 0.5).unwrap()
 }
 
 fn pair(seed: u64) -> (Tensor<3>, Tensor<3>) {
@@ -132,17 +132,19 @@ fn fuse(
     };
     let (dense, skeleton) = (tensors(dense), tensors(skeleton));
     let cloud = |points: &[f64]| tensor::<3>(points, [1, points.len() / 3, 3], &device);
-    config.fuse(
-        BranchPose { rotation: &dense.0, translation: &dense.1, points: &dense.2, matches: &dense.3 },
-        BranchPose {
-            rotation: &skeleton.0,
-            translation: &skeleton.1,
-            points: &skeleton.2,
-            matches: &skeleton.3,
-        },
-        &cloud(source),
-        &cloud(target),
-    )
+    config
+        .fuse(
+            BranchPose { rotation: &dense.0, translation: &dense.1, points: &dense.2, matches: &dense.3 },
+            BranchPose {
+                rotation: &skeleton.0,
+                translation: &skeleton.1,
+                points: &skeleton.2,
+                matches: &skeleton.3,
+            },
+            &cloud(source),
+            &cloud(target),
+        )
+        .unwrap()
 }
 
 fn fused_pose(fusion: &Fusion) -> Rigid {

@@ -96,7 +96,7 @@ fn rows_and_host_copies_number_points_alike() {
     let (batch, points) = (3, 7);
     let flat = Numbers(5).many(batch * points * 3);
     let clouds = tensor(&flat, [batch, points, 3], &device);
-    let host = HostClouds::read(&clouds);
+    let host = HostClouds::read(&clouds).unwrap();
     assert_eq!(host.iter().count(), batch);
     // Point 2 i + 1 of cloud i, then point 0.
     let indices = flat_indices(&host, points, |i, _| vec![2 * i as u32 + 1, 0]);

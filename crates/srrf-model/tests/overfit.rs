@@ -134,12 +134,13 @@ impl Lesson {
         for step in 0..steps {
             model.sem = model.sem.train();
             let (source, target) = self.clouds();
-            let (x, y) = (model.sem.forward(source.clone()), model.sem.forward(target.clone()));
+            let (x, y) =
+                (model.sem.forward(source.clone()).unwrap(), model.sem.forward(target.clone()).unwrap());
             let loss = if step < warm {
-                chamfer(x.points, source) + chamfer(y.points, target)
+                chamfer(x.points, source).unwrap() + chamfer(y.points, target).unwrap()
             } else {
                 let pose = (self.rotation.clone(), self.translation.clone());
-                skeleton_loss(&config, (source, &x), (target, &y), pose.0, pose.1).total
+                skeleton_loss(&config, (source, &x), (target, &y), pose.0, pose.1).unwrap().total
             };
             let grads = GradientsParams::from_grads(loss.backward(), &model.sem);
             model.sem = adam.step(rate(3e-3, step, steps), model.sem, grads).valid();
@@ -155,7 +156,7 @@ impl Lesson {
             let (dense, skeleton) = (model.dense.train(), model.skeleton.train());
             let network = Srrf { sem: model.sem, dense, skeleton };
             let (source, target) = self.clouds();
-            let output = network.forward(integration, source, target, 0.5);
+            let output = network.forward(integration, source, target, 0.5).unwrap();
             let pose = |r: &Tensor<3>, t: &Tensor<2>| {
                 registration_loss(r.clone(), t.clone(), self.rotation.clone(), self.translation.clone())
             };
@@ -177,9 +178,9 @@ impl Lesson {
     /// The largest rotation error of the eight pairs in degrees: dense, skeleton, fused.
     fn worst_deg(&self, model: &Srrf, integration: &IntegrationConfig) -> [f64; 3] {
         let (source, target) = self.clouds();
-        let output = model.forward(integration, source, target, 0.5);
+        let output = model.forward(integration, source, target, 0.5).unwrap();
         let worst = |rotation: &Tensor<3>, translation: &Tensor<2>| {
-            let found = self.batch.poses(rotation, translation);
+            let found = self.batch.poses(rotation, translation).unwrap();
             let errors = found.iter().zip(&self.truth).map(|(a, b)| a.unwrap().angle_to_deg(b));
             errors.fold(0.0, f64::max)
         };

@@ -48,13 +48,13 @@ fn combined(weights: &[f64], rows: &[f64], skeleton_points: usize, channels: usi
 #[test]
 fn skeletons_are_convex_combinations_of_sampled_points() {
     let x = clouds(1, CLOUDS, POINTS);
-    let Skeleton { points, radii, weights, samples } = sem().forward(x.clone());
+    let Skeleton { points, radii, weights, samples } = sem().forward(x.clone()).unwrap();
     assert_eq!(samples.dims(), [CLOUDS, 23, 3]);
     assert_eq!(weights.dims(), [CLOUDS, 23, 19]);
     assert_eq!(points.dims(), [CLOUDS, 19, 3]);
     assert_eq!(radii.dims(), [CLOUDS, 19]);
     // Samples are points of the cloud; distances are floored at 1e-6.
-    assert!(values(&nearest_distance(samples.clone(), x)).iter().all(|&d| d <= 1.1e-6));
+    assert!(values(&nearest_distance(samples.clone(), x).unwrap()).iter().all(|&d| d <= 1.1e-6));
 
     let mut numbers = Numbers(2);
     for i in 0..CLOUDS {
@@ -90,16 +90,16 @@ fn skeletons_are_convex_combinations_of_sampled_points() {
 #[test]
 fn skeletons_do_not_depend_on_the_order_of_the_points_nor_on_the_batch() {
     let (sem, x) = (sem(), clouds(4, CLOUDS, POINTS));
-    let whole = sem.forward(x.clone());
-    let shuffled = sem.forward(reordered(&x, &Numbers(5).permutation(POINTS)));
+    let whole = sem.forward(x.clone()).unwrap();
+    let shuffled = sem.forward(reordered(&x, &Numbers(5).permutation(POINTS))).unwrap();
     assert!(apart(&whole.points, &shuffled.points) < 1e-5);
     assert!(apart(&whole.radii, &shuffled.radii) < 1e-5);
     assert!(apart(&whole.samples, &shuffled.samples) == 0.0, "farthest points come in their own order");
     for i in 0..CLOUDS {
-        let alone = sem.forward(x.clone().narrow(0, i, 1));
+        let alone = sem.forward(x.clone().narrow(0, i, 1)).unwrap();
         assert!(apart(&whole.points.clone().narrow(0, i, 1), &alone.points) < 1e-6);
     }
-    let other = sem.forward(clouds(6, CLOUDS, POINTS));
+    let other = sem.forward(clouds(6, CLOUDS, POINTS)).unwrap();
     assert!(apart(&whole.points, &other.points) > 0.05, "another cloud, another skeleton");
 }
 
@@ -112,7 +112,7 @@ fn skeletons_of_small_and_of_degenerate_clouds_are_finite() {
         (clouds(9, 2, 1), 1),
         (clouds(10, 2, POINTS) * 0.0, 23),
     ] {
-        let skeleton = sem().forward(x);
+        let skeleton = sem().forward(x).unwrap();
         assert_eq!(skeleton.weights.dims(), [2, samples, 19]);
         for found in [values(&skeleton.points), values(&skeleton.radii), values(&skeleton.weights)] {
             assert!(found.iter().all(|v| v.is_finite()));
@@ -123,7 +123,7 @@ fn skeletons_of_small_and_of_degenerate_clouds_are_finite() {
 #[test]
 fn nearest_distances_and_spread_are_what_they_say() {
     let (a, b) = (clouds(11, 2, 7), clouds(12, 2, 13));
-    let found = values(&nearest_distance(a.clone(), b.clone()));
+    let found = values(&nearest_distance(a.clone(), b.clone()).unwrap());
     let (a, b) = (values(&a), values(&b));
     for cloud in 0..2 {
         for i in 0..7 {
@@ -162,7 +162,7 @@ fn distribution_distance_over_the_spread_does_not_reward_shrinking() {
         let cloud = clouds(5, 1, 40);
         let (x, y) = (skeleton(3, source), skeleton(4, target));
         let still = Tensor::zeros([1, 3], &device);
-        skeleton_loss(&config, (cloud.clone(), &x), (cloud, &y), rotation.clone(), still)
+        skeleton_loss(&config, (cloud.clone(), &x), (cloud, &y), rotation.clone(), still).unwrap()
     };
     let number = |x: &Tensor<1>| values(x)[0];
     let (whole, half, lone) = (at(1.0, 1.0), at(0.5, 0.5), at(1.0, 0.5));
@@ -184,15 +184,15 @@ fn sfe() -> Sfe {
 fn structural_features_follow_the_order_of_the_tokens_and_not_that_of_the_cloud() {
     let (sfe, cloud) = (sfe(), clouds(14, CLOUDS, POINTS));
     let tokens = cloud.clone().narrow(1, 0, 29);
-    let features = sfe.forward(tokens.clone(), cloud.clone());
+    let features = sfe.forward(tokens.clone(), cloud.clone()).unwrap();
     assert_eq!(features.dims(), [CLOUDS, 29, 18]);
 
     let order = Numbers(15).permutation(29);
-    let permuted = sfe.forward(reordered(&tokens, &order), cloud.clone());
+    let permuted = sfe.forward(reordered(&tokens, &order), cloud.clone()).unwrap();
     assert!(apart(&permuted, &reordered(&features, &order)) < 1e-4);
-    let shuffled = sfe.forward(tokens.clone(), reordered(&cloud, &Numbers(16).permutation(POINTS)));
+    let shuffled = sfe.forward(tokens.clone(), reordered(&cloud, &Numbers(16).permutation(POINTS))).unwrap();
     assert!(apart(&features, &shuffled) < 1e-4);
-    let alone = sfe.forward(tokens.narrow(0, 1, 1), cloud.narrow(0, 1, 1));
+    let alone = sfe.forward(tokens.narrow(0, 1, 1), cloud.narrow(0, 1, 1)).unwrap();
     assert!(apart(&features.clone().narrow(0, 1, 1), &alone) < 1e-5);
 
     // The last step is a LayerNorm, at its initial scale and shift.
@@ -209,10 +209,10 @@ fn structural_features_see_the_neighbours() {
     // looks at the whole cloud; the other cloud of the batch stays as it is.
     let (sfe, cloud) = (sfe(), clouds(17, 2, POINTS));
     let tokens = cloud.clone().narrow(1, 0, 29);
-    let before = sfe.forward(tokens.clone(), cloud.clone());
+    let before = sfe.forward(tokens.clone(), cloud.clone()).unwrap();
     let place = tokens.clone().slice([0..1, 3..4]) + 0.001;
     let changed = cloud.clone().slice_assign([0..1, 50..51, 0..3], place);
-    let after = sfe.forward(tokens, changed);
+    let after = sfe.forward(tokens, changed).unwrap();
     assert!(apart(&before.clone().narrow(0, 0, 1), &after.clone().narrow(0, 0, 1)) > 1e-2);
     assert!(apart(&before.narrow(0, 1, 1), &after.narrow(0, 1, 1)) < 1e-6);
 }
@@ -293,17 +293,17 @@ fn branches_of_all_points_and_of_tokens() {
     let config = BranchConfig { tokens: 29, ..tiny().dense };
     let branch = init::seeded(config.init(&Device::flex()), 31);
     for (tokens, n) in [(29, 29), (0, POINTS), (POINTS, POINTS), (1001, POINTS)] {
-        let found = branch.clone().with_tokens(tokens).forward(x.clone(), y.clone(), 0.5);
+        let found = branch.clone().with_tokens(tokens).forward(x.clone(), y.clone(), 0.5).unwrap();
         assert_eq!(found.rotation.dims(), [CLOUDS, 3, 3]);
         assert_eq!(found.translation.dims(), [CLOUDS, 3]);
         assert_eq!(found.probabilities.dims(), [CLOUDS, n, n]);
         for points in [&found.source_points, &found.target_points, &found.matches] {
             assert_eq!(points.dims(), [CLOUDS, n, 3]);
         }
-        let distance = values(&nearest_distance(found.source_points, x.clone()));
+        let distance = values(&nearest_distance(found.source_points, x.clone()).unwrap());
         assert!(distance.iter().all(|&d| d <= 1.1e-6), "tokens are points of the cloud");
     }
     // The phase chooses other tokens.
-    let at = |phase| branch.forward(x.clone(), y.clone(), phase).source_points;
+    let at = |phase| branch.forward(x.clone(), y.clone(), phase).unwrap().source_points;
     assert!(apart(&at(0.0), &at(0.9)) > 0.1);
 }

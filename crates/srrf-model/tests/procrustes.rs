@@ -24,14 +24,14 @@ fn gradient(m: &Matrix3<f64>, c: &Matrix3<f64>) -> Matrix3<f64> {
     let device = Device::flex().autodiff();
     let input = tensor64::<3>(&row_major(m), [1, 3, 3], &device).require_grad();
     let weights = tensor64::<3>(&row_major(c), [1, 3, 3], &device);
-    let grads = (nearest_rotation(input.clone()) * weights).sum().backward();
+    let grads = (nearest_rotation(input.clone()).unwrap() * weights).sum().backward();
     Matrix3::from_row_slice(&values(&input.grad(&grads).expect("a gradient")))
 }
 
 /// `sum C o R(M)`.
 fn value(m: &Matrix3<f64>, c: &Matrix3<f64>) -> f64 {
     let input = tensor64::<3>(&row_major(m), [1, 3, 3], &Device::flex());
-    Matrix3::from_row_slice(&values(&nearest_rotation(input))).component_mul(c).sum()
+    Matrix3::from_row_slice(&values(&nearest_rotation(input).unwrap())).component_mul(c).sum()
 }
 
 /// Central difference of [`value`] along `direction`.
@@ -139,7 +139,7 @@ fn gradients_of_the_pose_are_those_of_finite_differences() {
     }
     let (c, d) = (numbers.many(batch * 9), numbers.many(batch * 3));
     let score = |source: Tensor<3>, target: Tensor<3>, device: &Device| {
-        let (rotation, translation) = procrustes(source, target);
+        let (rotation, translation) = procrustes(source, target).unwrap();
         (rotation * tensor64::<3>(&c, [batch, 3, 3], device)).sum()
             + (translation * tensor64::<2>(&d, [batch, 3], device)).sum()
     };
@@ -197,7 +197,7 @@ fn rotations_are_proper_whatever_comes_in() {
         for device in [Device::flex(), Device::flex().autodiff()] {
             let shape = [matrices.len(), 3, 3];
             let input = Tensor::<3>::from_data(TensorData::new(flat.clone(), shape), (&device, dtype));
-            for (m, r) in matrices.iter().zip(values(&nearest_rotation(input)).chunks_exact(9)) {
+            for (m, r) in matrices.iter().zip(values(&nearest_rotation(input).unwrap()).chunks_exact(9)) {
                 let r = Matrix3::from_row_slice(r);
                 let skew = (r.transpose() * r - Matrix3::identity()).abs().max();
                 assert!((r.determinant() - 1.0).abs() < tolerance && skew < tolerance, "{m}{r}");
@@ -226,7 +226,7 @@ fn a_matrix_that_is_not_finite_shows_in_the_gradient_of_its_own_pair_only() {
     let mut flat = numbers.many(27);
     flat[13] = f64::NAN;
     let input = tensor64::<3>(&flat, [3, 3, 3], &device).require_grad();
-    let rotation = nearest_rotation(input.clone());
+    let rotation = nearest_rotation(input.clone()).unwrap();
     let identity = row_major(&Matrix3::identity());
     assert_eq!(values(&rotation)[9..18], identity[..]);
     let weights = tensor64::<3>(&numbers.many(27), [3, 3, 3], &device);
@@ -255,7 +255,7 @@ fn known_poses_are_recovered() {
                     let source = tensor(cloud.iter().flatten().copied().collect(), points);
                     let target =
                         tensor(cloud.iter().flat_map(|p| (rotation * p + t).data.0[0]).collect(), points);
-                    let (found, found_t) = procrustes(source, target);
+                    let (found, found_t) = procrustes(source, target).unwrap();
                     let error = difference(&values(&found), &row_major(&rotation));
                     assert!(error < tolerance * 100.0 / 4.0, "{points} points, {dtype:?}: {error:e}");
                     assert!(difference(&values(&found_t), t.as_slice()) < tolerance * 25.0);
@@ -279,7 +279,7 @@ fn weighted_fit_is_that_of_the_host_and_differentiable_in_the_weights() {
         if device.is_autodiff() {
             w = w.require_grad();
         }
-        let (rotation, translation) = weighted_procrustes(points(&x), points(&y), w.clone());
+        let (rotation, translation) = weighted_procrustes(points(&x), points(&y), w.clone()).unwrap();
         (w, rotation, translation)
     };
     let (_, rotation, translation) = fit(&weights, &Device::flex());

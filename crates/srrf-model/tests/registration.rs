@@ -84,7 +84,9 @@ fn batches_hold_network_units_and_return_poses() {
     let (rotation, translation) = batch.truth(&poses);
     let moved = srrf_model::transform(batch.source.clone(), rotation.clone(), translation.clone());
     assert!(difference(&values(&moved), &values(&batch.target)) < 1e-6);
-    for ((found, pose), source) in batch.poses(&rotation, &translation).iter().zip(&poses).zip(&sources) {
+    for ((found, pose), source) in
+        batch.poses(&rotation, &translation).unwrap().iter().zip(&poses).zip(&sources)
+    {
         let extent = 2.0 * source.to_unit_sphere().1.radius;
         assert!(image_gap(source, &found.unwrap(), pose) < 1e-6 * extent, "also far from the origin");
     }
@@ -92,7 +94,7 @@ fn batches_hold_network_units_and_return_poses() {
     // One pose that is not finite spoils no other.
     let broken =
         translation.slice_assign([1..2, 0..1], burn::tensor::Tensor::full([1, 1], f32::NAN, &device));
-    let found = batch.poses(&rotation, &broken);
+    let found = batch.poses(&rotation, &broken).unwrap();
     assert_eq!(found.iter().map(Option::is_some).collect::<Vec<_>>(), [true, false, true]);
 }
 

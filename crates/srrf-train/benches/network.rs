@@ -101,7 +101,7 @@ mod network {
         let pair = pair();
         let batch = PairBatch::new(&[(&pair.source, &pair.target)], &device).expect("one pair");
         let (source, target) = (batch.source, batch.target);
-        let output = model.forward(&config.integration, source.clone(), target.clone(), PHASE);
+        let output = model.forward(&config.integration, source.clone(), target.clone(), PHASE).unwrap();
         Bench { config, device, model, source, target, output }
     }
 
@@ -123,14 +123,15 @@ mod network {
     #[divan::bench]
     fn forward(bencher: Bencher) {
         let b = bench();
-        let run = || b.model.forward(&b.config.integration, b.source.clone(), b.target.clone(), PHASE);
+        let run =
+            || b.model.forward(&b.config.integration, b.source.clone(), b.target.clone(), PHASE).unwrap();
         bencher.bench_local(run);
     }
 
     #[divan::bench]
     fn sem_one_cloud(bencher: Bencher) {
         let b = bench();
-        bencher.bench_local(|| b.model.sem.forward(b.source.clone()));
+        bencher.bench_local(|| b.model.sem.forward(b.source.clone()).unwrap());
     }
 
     #[divan::bench(args = BRANCHES)]
@@ -138,14 +139,14 @@ mod network {
         let b = bench();
         let (config, clouds, tokens) = branch(&b, name);
         let sfe = config.sfe.init(&b.device);
-        bencher.bench_local(|| sfe.forward(tokens.clone(), clouds.clone()));
+        bencher.bench_local(|| sfe.forward(tokens.clone(), clouds.clone()).unwrap());
     }
 
     #[divan::bench(args = BRANCHES)]
     fn pfi(bencher: Bencher, name: &str) {
         let b = bench();
         let (config, clouds, tokens) = branch(&b, name);
-        let features = config.sfe.init(&b.device).forward(tokens.clone(), clouds);
+        let features = config.sfe.init(&b.device).forward(tokens.clone(), clouds).unwrap();
         let pfi = config.pfi.init(config.sfe.output_width(), &b.device);
         bencher.bench_local(|| pfi.forward(features.clone(), tokens.clone()));
     }
@@ -154,7 +155,7 @@ mod network {
     fn matching(bencher: Bencher, name: &str) {
         let b = bench();
         let (config, clouds, tokens) = branch(&b, name);
-        let features = config.sfe.init(&b.device).forward(tokens.clone(), clouds).chunk(2, 0);
+        let features = config.sfe.init(&b.device).forward(tokens.clone(), clouds).unwrap().chunk(2, 0);
         let points = tokens.chunk(2, 0)[1].clone();
         let matching = SoftMatching::new(&b.device);
         bencher
@@ -165,13 +166,14 @@ mod network {
     fn svd(bencher: Bencher, name: &str) {
         let b = bench();
         let output = if name == "dense" { &b.output.dense } else { &b.output.skeleton };
-        bencher.bench_local(|| procrustes(output.source_points.clone(), output.matches.clone()));
+        bencher.bench_local(|| procrustes(output.source_points.clone(), output.matches.clone()).unwrap());
     }
 
     #[divan::bench]
     fn integration(bencher: Bencher) {
         let b = bench();
         let poses = || (b.output.dense.pose(), b.output.skeleton.pose());
-        bencher.bench_local(|| b.config.integration.fuse(poses().0, poses().1, &b.source, &b.target));
+        bencher
+            .bench_local(|| b.config.integration.fuse(poses().0, poses().1, &b.source, &b.target).unwrap());
     }
 }

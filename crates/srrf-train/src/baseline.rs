@@ -7,7 +7,7 @@ use burn::optim::GradientsParams;
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 use srrf_baselines::{LearnedConfig, Lesson, embedded};
-use srrf_model::ops::HostClouds;
+use srrf_model::ops::{CopyError, HostClouds};
 use srrf_model::weights::{WeightsError, parse, read};
 use srrf_model::{NetworkConfig, WrongSize};
 
@@ -65,19 +65,20 @@ impl<C: LearnedConfig> Trained for Baseline<C> {
         network: &C::Network,
         shard: Shard,
         (): (),
-    ) -> (GradientsParams, Losses) {
+    ) -> Result<(GradientsParams, Losses), CopyError> {
         let network = network.clone().train();
         let mut terms = Terms::default();
-        for (name, value, weight) in self.0.losses(losses, &network, &lesson(shard)) {
+        for (name, value, weight) in self.0.losses(losses, &network, &lesson(shard))? {
             terms.add(name, value, weight);
         }
         terms.finish(&network)
     }
 
-    fn found(&self, network: &C::Network, shard: Shard) -> Found {
+    fn found(&self, network: &C::Network, shard: Shard) -> Result<Found, CopyError> {
         let (source, target) = (shard.batch.source.clone(), shard.batch.target.clone());
-        let pose = self.0.pose(network, source, target);
-        Found { poses: vec![shard.batch.poses(&pose.rotation, &pose.translation)], notes: Vec::new() }
+        let pose = self.0.pose(network, source, target)?;
+        let poses = vec![shard.batch.poses(&pose.rotation, &pose.translation)?];
+        Ok(Found { poses, notes: Vec::new() })
     }
 }
 

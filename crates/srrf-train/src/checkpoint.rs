@@ -86,6 +86,7 @@ pub fn save<C: Trained>(
     let path = folder.join(FILE);
     let broken = |why: String| CheckpointError::Broken { path: path.clone(), why };
     let mut tensors: Vec<(String, Dtype, Vec<usize>, Vec<u8>)> = parameters(model)
+        .map_err(|source| WeightsError::Copy { origin: "the network".into(), source })?
         .into_iter()
         .map(|(name, (shape, values))| {
             let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();

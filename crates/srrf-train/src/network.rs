@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use srrf_cloud::Rigid;
 use srrf_cloud::profile::stage;
-use srrf_model::ops::HostClouds;
+use srrf_model::ops::{CopyError, HostClouds, to_host};
 use srrf_model::weights::WeightsError;
 use srrf_model::{NetworkConfig, PairBatch};
 
@@ -70,17 +70,23 @@ pub trait Trained: NetworkConfig {
 
     /// What the device can do of a shard ahead of its step, on other threads: what depends on those parts of
     /// `network` alone that none of the `stages` of the run trains. Only called where a device computes beside the host.
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
     fn ahead(
         &self,
         _stages: &[StageConfig],
         _network: &Self::Network,
         _shard: &Shard,
         layout: Self::Layout,
-    ) -> Self::Layout {
-        layout
+    ) -> Result<Self::Layout, CopyError> {
+        Ok(layout)
     }
 
     /// Gradients and losses of one shard, on a graph of its own.
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
     fn gradient(
         &self,
         losses: &Self::LossConfig,
@@ -88,10 +94,13 @@ pub trait Trained: NetworkConfig {
         network: &Self::Network,
         shard: Shard,
         layout: Self::Layout,
-    ) -> (GradientsParams, Losses);
+    ) -> Result<(GradientsParams, Losses), CopyError>;
 
     /// The poses of a shard, as at inference.
-    fn found(&self, network: &Self::Network, shard: Shard) -> Found;
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
+    fn found(&self, network: &Self::Network, shard: Shard) -> Result<Found, CopyError>;
 }
 
 /// The weighted sum of the loss terms, and their values.
@@ -115,7 +124,10 @@ impl Terms {
     }
 
     /// The gradient of the sum for the parameters of `network`, and the values.
-    pub fn finish<M: Module>(self, network: &M) -> (GradientsParams, Losses) {
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
+    pub fn finish<M: Module>(self, network: &M) -> Result<(GradientsParams, Losses), CopyError> {
         let (mut names, mut values): (Vec<_>, Vec<_>) = self.values.into_iter().unzip();
         let mut gradients = GradientsParams::new();
         if let Some(total) = self.total {
@@ -124,7 +136,7 @@ impl Terms {
             gradients = stage("backward", || GradientsParams::from_grads(total.backward(), network));
         }
         // Read last and at once: a device that works ahead would have to stop for each.
-        let values = Tensor::cat(values, 0).try_to_vec_as::<f64>().unwrap_or_default();
-        (gradients, names.into_iter().zip(values).collect())
+        let values: Vec<f64> = to_host(&Tensor::cat(values, 0))?;
+        Ok((gradients, names.into_iter().zip(values).collect()))
     }
 }

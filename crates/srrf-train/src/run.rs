@@ -53,6 +53,9 @@ pub enum RunError {
     /// The weights cannot be written.
     #[error(transparent)]
     Weights(#[from] srrf_model::weights::WeightsError),
+    /// The device did not give its numbers.
+    #[error(transparent)]
+    Copy(#[from] srrf_model::CopyError),
     /// A step could not be made.
     #[error(transparent)]
     Step(#[from] StepError),
@@ -200,7 +203,7 @@ pub fn run<C: Trained>(
                     let stage = &config.stages[plan.stage(number / shards)];
                     let d = device_of(number % shards, &devices);
                     let prepared = prepare(config, stage, &pairs, number, &devices[d])?;
-                    Ok(prepared.ahead(config, &networks[d]))
+                    prepared.ahead(config, &networks[d])
                 });
             });
         }

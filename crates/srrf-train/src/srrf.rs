@@ -4,7 +4,7 @@ use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};
 use srrf_cloud::Rigid;
-use srrf_model::ops::HostClouds;
+use srrf_model::ops::{CopyError, HostClouds};
 use srrf_model::weights::WeightsError;
 use srrf_model::{
     BranchLayout, BranchOutput, SemLayout, Skeleton, Srrf, SrrfConfig, SrrfLayout, chamfer,
@@ -40,17 +40,23 @@ impl Trained for SrrfConfig {
         }
     }
 
-    fn ahead(&self, stages: &[StageConfig], network: &Srrf, shard: &Shard, layout: Layout) -> Layout {
-        let Layout::Whole(mut layout) = layout else { return layout };
+    fn ahead(
+        &self,
+        stages: &[StageConfig],
+        network: &Srrf,
+        shard: &Shard,
+        layout: Layout,
+    ) -> Result<Layout, CopyError> {
+        let Layout::Whole(mut layout) = layout else { return Ok(layout) };
         let device = shard.batch.source.device();
         layout.dense.send(&device);
         if stages.iter().any(|stage| stage.sem != SemTraining::Frozen) {
-            return Layout::Whole(layout);
+            return Ok(Layout::Whole(layout));
         }
-        let skeletons = network.sem.forward_with(shard.clouds(), &layout.sem).detached_points();
-        let mut on_skeletons = network.skeleton.layout(&HostClouds::read(&skeletons), layout.phase);
+        let skeletons = network.sem.forward_with(shard.clouds(), &layout.sem)?.detached_points();
+        let mut on_skeletons = network.skeleton.layout(&HostClouds::read(&skeletons)?, layout.phase);
         on_skeletons.send(&device);
-        Layout::Registration(Box::new(FrozenSkeletons { layout, skeletons, on_skeletons }))
+        Ok(Layout::Registration(Box::new(FrozenSkeletons { layout, skeletons, on_skeletons })))
     }
 
     fn gradient(
@@ -60,7 +66,7 @@ impl Trained for SrrfConfig {
         network: &Srrf,
         shard: Shard,
         layout: Layout,
-    ) -> (GradientsParams, Losses) {
+    ) -> Result<(GradientsParams, Losses), CopyError> {
         // Only what the stage trains is on the graph.
         let trains_sem = stage.sem != SemTraining::Frozen;
         let mut fork = network.clone();
@@ -71,15 +77,15 @@ impl Trained for SrrfConfig {
         let (skeletons, branches) = match layout {
             Layout::Whole(layout) => {
                 let (source, target) = (shard.batch.source.clone(), shard.batch.target.clone());
-                let (skeletons, skeleton, dense) = fork.branches(source, target, &layout);
+                let (skeletons, skeleton, dense) = fork.branches(source, target, &layout)?;
                 (Some(skeletons), Some((skeleton, dense)))
             }
             Layout::Registration(known) => {
                 let FrozenSkeletons { layout, skeletons, on_skeletons } = *known;
-                (None, Some(fork.poses(skeletons, &on_skeletons, shard.clouds(), &layout)))
+                (None, Some(fork.poses(skeletons, &on_skeletons, shard.clouds(), &layout)?))
             }
             Layout::Skeletons(layout) => {
-                (Some(fork.sem.forward_with(shard.clouds(), &layout).halves()), None)
+                (Some(fork.sem.forward_with(shard.clouds(), &layout)?.halves()), None)
             }
         };
         let Shard { batch, rotation, translation, .. } = shard;
@@ -90,35 +96,35 @@ impl Trained for SrrfConfig {
                 branch_terms(&mut terms, names, branch, losses, &rotation, &translation);
             }
             if losses.fused > 0.0 {
-                let fused = self.integration.fuse(dense.pose(), skeleton.pose(), &source, &target);
+                let fused = self.integration.fuse(dense.pose(), skeleton.pose(), &source, &target)?;
                 let (r, t) = (rotation.clone(), translation.clone());
                 terms.add("fused", registration_loss(fused.rotation, fused.translation, r, t), losses.fused);
             }
         }
         if let Some((source_skeleton, target_skeleton)) = skeletons.filter(|_| trains_sem) {
             let (x, y) = ((source, &source_skeleton), (target, &target_skeleton));
-            skeleton_terms(&mut terms, stage.sem, losses, x, y, rotation, translation);
+            skeleton_terms(&mut terms, stage.sem, losses, x, y, rotation, translation)?;
         }
         terms.finish(&fork)
     }
 
-    fn found(&self, network: &Srrf, shard: Shard) -> Found {
+    fn found(&self, network: &Srrf, shard: Shard) -> Result<Found, CopyError> {
         let Shard { batch, rotation, translation, phase } = shard;
-        let output = network.forward(&self.integration, batch.source.clone(), batch.target.clone(), phase);
+        let output = network.forward(&self.integration, batch.source.clone(), batch.target.clone(), phase)?;
         let poses: Vec<Vec<Option<Rigid>>> = vec![
-            batch.poses(&output.dense.rotation, &output.dense.translation),
-            batch.poses(&output.skeleton.rotation, &output.skeleton.translation),
-            batch.poses(&output.fused.rotation, &output.fused.translation),
+            batch.poses(&output.dense.rotation, &output.dense.translation)?,
+            batch.poses(&output.skeleton.rotation, &output.skeleton.translation)?,
+            batch.poses(&output.fused.rotation, &output.fused.translation)?,
         ];
         let posed = transform(output.source_skeleton.points, rotation, translation);
         let target = output.target_skeleton.points;
         // Mean Chamfer distance (unsquared, both ways) between the posed source skeleton and the target
         // skeleton, and the root mean square distance of skeleton points from their mean.
         let notes = vec![
-            ("skeleton_chamfer", chamfer(posed, target.clone()).into_scalar::<f64>()),
+            ("skeleton_chamfer", chamfer(posed, target.clone())?.into_scalar::<f64>()),
             ("skeleton_spread", spread(target).into_scalar::<f64>()),
         ];
-        Found { poses, notes }
+        Ok(Found { poses, notes })
     }
 }
 
@@ -180,15 +186,15 @@ fn skeleton_terms(
     (target, target_skeleton): (Tensor<3>, &Skeleton),
     rotation: Tensor<3>,
     translation: Tensor<2>,
-) {
+) -> Result<(), CopyError> {
     terms.add("spread", spread(target_skeleton.points.clone().detach()), 0.0);
     if training == SemTraining::Chamfer {
         let points = Tensor::cat(vec![source_skeleton.points.clone(), target_skeleton.points.clone()], 0);
-        terms.add("chamfer", chamfer(points, Tensor::cat(vec![source, target], 0)), 1.0);
-        return;
+        terms.add("chamfer", chamfer(points, Tensor::cat(vec![source, target], 0))?, 1.0);
+        return Ok(());
     }
     let (x, y) = ((source, source_skeleton), (target, target_skeleton));
-    let loss = skeleton_loss(&losses.skeleton, x, y, rotation, translation);
+    let loss = skeleton_loss(&losses.skeleton, x, y, rotation, translation)?;
     terms.add("sampling", loss.sampling, 0.0);
     terms.add("point_to_sphere", loss.point_to_sphere, 0.0);
     terms.add("radius", loss.radius, 0.0);
@@ -196,4 +202,5 @@ fn skeleton_terms(
     terms.add("distribution_over_spread", loss.distribution_over_spread, 0.0);
     terms.add("index_match", loss.index_match, 0.0);
     terms.add("sem", loss.total, 1.0);
+    Ok(())
 }

@@ -16,7 +16,7 @@ pub(crate) fn starting_model<C: Trained>(
     device: &Device,
 ) -> Result<C::Network, RunError> {
     let fresh = init::seeded(config.network.init(device), config.seed);
-    let mut values = parameters(&fresh);
+    let mut values = parameters(&fresh)?;
     let parts: Vec<(&str, &String)> = match start {
         StartConfig::Whole(start) => vec![("", start)],
         StartConfig::Parts(parts) => parts.iter().map(|(part, start)| (part.as_str(), start)).collect(),
@@ -26,7 +26,7 @@ pub(crate) fn starting_model<C: Trained>(
         let within = |name: &String| part.is_empty() || name.split('.').next() == Some(part);
         let unread = |source| RunError::StartFile { start: start.clone(), source };
         let loaded = C::start(start, device).map_err(unread)?;
-        let theirs: Vec<_> = parameters(&loaded).into_iter().filter(|(name, _)| within(name)).collect();
+        let theirs: Vec<_> = parameters(&loaded)?.into_iter().filter(|(name, _)| within(name)).collect();
         if theirs.is_empty() {
             return Err(wrong(part.to_string()));
         }

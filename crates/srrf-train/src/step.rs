@@ -70,10 +70,17 @@ pub fn prepare<C: Trained>(
 
 impl<L> Prepared<L> {
     /// With what the device can do ahead of the step; see [`Trained::ahead`].
-    pub fn ahead<C: Trained<Layout = L>>(self, config: &TrainConfig<C>, network: &C::Network) -> Self {
+    ///
+    /// # Errors
+    /// [`StepError::Copy`] where the device does not give its numbers.
+    pub fn ahead<C: Trained<Layout = L>>(
+        self,
+        config: &TrainConfig<C>,
+        network: &C::Network,
+    ) -> Result<Self, StepError> {
         let Self { shard, layout } = self;
-        let layout = config.network.ahead(&config.stages, network, &shard, layout);
-        Self { shard, layout }
+        let layout = config.network.ahead(&config.stages, network, &shard, layout)?;
+        Ok(Self { shard, layout })
     }
 }
 
@@ -96,6 +103,9 @@ pub enum StepError {
     /// The pairs of a shard differ in their number of points.
     #[error("pairs {0}.. differ in their number of points")]
     Ragged(usize),
+    /// A device did not give its numbers.
+    #[error(transparent)]
+    Copy(#[from] srrf_model::CopyError),
     /// There is no device to run on.
     #[error("no device was given")]
     NoDevice,
@@ -196,7 +206,7 @@ pub fn gradient<C: Trained>(
     if shards > 1 {
         gradients.scale(1.0 / shards as f64);
     }
-    let norm = gradients.norm();
+    let norm = gradients.norm()?;
     Ok(StepOutcome { gradients, norm, losses })
 }
 
@@ -237,6 +247,6 @@ fn shard<C: Trained>(
     };
     let Prepared { shard, layout } = prepared?;
     let (gradients, losses) =
-        profile::stage("network", || config.network.gradient(&config.losses, stage, network, shard, layout));
+        profile::stage("network", || config.network.gradient(&config.losses, stage, network, shard, layout))?;
     Ok((RowGradients::new(gradients, network), losses))
 }

@@ -29,6 +29,9 @@ pub enum ValidateError {
     /// The pairs differ in size, or a worker stopped.
     #[error("the validation pairs could not be run through the network")]
     Failed,
+    /// The device did not give its numbers.
+    #[error(transparent)]
+    Copy(#[from] srrf_model::CopyError),
 }
 
 /// Scores `model` on `pairs`, `chunk` of them at a time.
@@ -50,7 +53,7 @@ pub fn validate<C: Trained>(
     let mut errors: Vec<Vec<PairError>> = vec![Vec::new(); C::ROWS.len()];
     let mut notes = BTreeMap::new();
     for (chunk, result) in chunks.iter().zip(results) {
-        let found = result.ok_or(ValidateError::Failed)?;
+        let found = result.ok_or(ValidateError::Failed)??;
         for (errors, poses) in errors.iter_mut().zip(found.poses) {
             let truths = chunk.iter().map(|pair| &pair.target_from_source);
             errors.extend(poses.iter().zip(truths).map(|(p, truth)| PairError::new(p.as_ref(), truth)));

@@ -124,7 +124,7 @@ fn pass(device: &Device, dtype: DType) -> (Numbers, Numbers) {
     let (source, target) = (batch.source.cast(dtype), batch.target.cast(dtype));
     let (rotation, translation) = (rotation.cast(dtype), translation.cast(dtype));
     let model = network(&config, device).map(&mut Cast(dtype)).train();
-    let output = model.forward(&config.network.integration, source.clone(), target.clone(), PHASE);
+    let output = model.forward(&config.network.integration, source.clone(), target.clone(), PHASE).unwrap();
 
     let mut found = Numbers::new();
     let fused = (output.fused.rotation.clone(), output.fused.translation.clone());
@@ -145,7 +145,7 @@ fn pass(device: &Device, dtype: DType) -> (Numbers, Numbers) {
     found.insert("skeleton".into(), values(&output.source_skeleton.points.clone().detach()));
     found.insert("radii".into(), values(&output.source_skeleton.radii.clone().detach()));
     let (x, y) = ((source, &output.source_skeleton), (target, &output.target_skeleton));
-    total = total + skeleton_loss(&config.losses.skeleton, x, y, rotation, translation).total;
+    total = total + skeleton_loss(&config.losses.skeleton, x, y, rotation, translation).unwrap().total;
 
     let all = GradientsParams::from_grads(total.backward(), &model);
     let mut gradients = Gradients { all, path: Vec::new(), found: Numbers::new() };
@@ -174,7 +174,7 @@ fn train(devices: &[Device], reduce: Reduce) -> (Vec<f64>, Vec<f64>) {
 }
 
 fn flat(model: &Srrf) -> Vec<f64> {
-    parameters(model).into_values().flat_map(|(_, values)| values).map(f64::from).collect()
+    parameters(model).unwrap().into_values().flat_map(|(_, values)| values).map(f64::from).collect()
 }
 
 fn largest(numbers: &[f64]) -> f64 {
@@ -315,9 +315,10 @@ fn what_is_done_ahead_of_a_step_changes_nothing() {
     let (stage, model) = (&config.stages[0], network(&config, &device).valid());
     let gradients = |ahead: bool| {
         let prepared = prepare(&config, stage, &pairs, 1, &device).unwrap();
-        let Prepared { shard, layout } = if ahead { prepared.ahead(&config, &model) } else { prepared };
+        let Prepared { shard, layout } =
+            if ahead { prepared.ahead(&config, &model).unwrap() } else { prepared };
         assert_eq!(matches!(layout, Layout::Registration(_)), ahead);
-        let (all, losses) = config.network.gradient(&config.losses, stage, &model, shard, layout);
+        let (all, losses) = config.network.gradient(&config.losses, stage, &model, shard, layout).unwrap();
         let mut gradients = Gradients { all, path: Vec::new(), found: Numbers::new() };
         model.visit(&mut gradients);
         (gradients.found, losses)

@@ -32,6 +32,7 @@ impl From<Error> for RegisterError {
             Error::Source(e) => Self::Source(e),
             Error::Target(e) => Self::Target(e),
             Error::Refine(e) => e.into(),
+            Error::Device(e) => e.into(),
             Error::NoPose(why) => Self::NoPose(why),
             other @ Error::Setup(_) => Self::NoPose(other.to_string()),
         }

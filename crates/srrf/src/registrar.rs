@@ -6,6 +6,7 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 use srrf_classical::{FpfhCloud, FpfhRansac, FpfhRansacConfig, Icp, IcpConfig};
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, Skeletons, Solid};
+use srrf_model::CopyError;
 use srrf_refine::{Ranking, RefineError, RefineTarget};
 
 use crate::frame::{Centred, from_input, to_input};
@@ -42,6 +43,9 @@ pub enum Error {
     /// The target cannot be used.
     #[error("target: {0}")]
     Target(#[source] CloudError),
+    /// The device did not give its numbers.
+    #[error(transparent)]
+    Device(#[from] CopyError),
     /// No method found a pose.
     #[error("no pose found: {0}")]
     NoPose(String),

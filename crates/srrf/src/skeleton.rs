@@ -2,7 +2,7 @@
 
 use srrf_cloud::{CloudError, PointCloud, Solid};
 use srrf_model::PairBatch;
-use srrf_model::ops::even_subsample;
+use srrf_model::ops::{even_subsample, to_host};
 
 use crate::frame::Centred;
 use crate::network::{open, thinned};
@@ -36,9 +36,8 @@ pub fn skeleton(cloud: &PointCloud, weights: Option<&str>, device: &str) -> Resu
     let seen = subsample(&thinned(&centred.cloud)).map_err(Error::Source)?;
     let not_finite = || Error::NoPose("the skeleton is not finite; are the coordinates extreme?".into());
     let batch = PairBatch::new(&[(&seen, &seen)], &device).ok_or_else(not_finite)?;
-    let found = loaded.model.sem.forward(batch.source.clone());
-    let centres = found.points.try_to_vec_as::<f64>().unwrap_or_default();
-    let radii = found.radii.try_to_vec_as::<f64>().unwrap_or_default();
+    let found = loaded.model.sem.forward(batch.source.clone())?;
+    let (centres, radii) = (to_host::<f64, 3>(&found.points)?, to_host::<f64, 2>(&found.radii)?);
     let frame = &batch.frames[0];
     // The frame's scale: what a unit of the network is in the cloud.
     let scale = frame.undo_source(&[1.0, 0.0, 0.0])[0] - frame.undo_source(&[0.0; 3])[0];

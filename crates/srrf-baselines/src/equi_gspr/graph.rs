@@ -5,7 +5,7 @@ use burn::nn::{LayerNorm, LayerNormConfig, Linear, LinearConfig};
 use burn::tensor::Tensor;
 use burn::tensor::{Device, activation};
 use srrf_model::fast::{Activation, linear};
-use srrf_model::ops::{HostClouds, flat_indices, k_nearest, rows};
+use srrf_model::ops::{CopyError, HostClouds, flat_indices, k_nearest, rows};
 
 /// Invariants of an edge: squared distance, distance, dot product.
 const INVARIANTS: usize = 3;
@@ -79,8 +79,8 @@ impl GraphLayer {
 
 /// Row numbers of the `k` nearest points of each point, itself included: `[clouds, n, 3]` to
 /// `clouds * n * k`.
-pub(super) fn neighbours(points: &Tensor<3>, k: usize) -> Vec<i64> {
+pub(super) fn neighbours(points: &Tensor<3>, k: usize) -> Result<Vec<i64>, CopyError> {
     let [_, n, _] = points.dims();
-    let host = HostClouds::read(points);
-    flat_indices(&host, n, |_, cloud| k_nearest(cloud, cloud, k))
+    let host = HostClouds::read(points)?;
+    Ok(flat_indices(&host, n, |_, cloud| k_nearest(cloud, cloud, k)))
 }

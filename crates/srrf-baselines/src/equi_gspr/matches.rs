@@ -1,7 +1,7 @@
 //! Putative matches by FPFH, and the choice among them.
 
 use burn::tensor::{Tensor, TensorData};
-use srrf_model::ops::{HostClouds, nearest, rows};
+use srrf_model::ops::{CopyError, HostClouds, nearest, rows, to_host};
 
 use srrf_classical::fpfh::{self, Descriptor, fpfh};
 use srrf_classical::nearest_descriptors;
@@ -34,9 +34,10 @@ pub(super) fn putative(
     tokens: &Tensor<3>,
     target: &Tensor<3>,
     radius: f64,
-) -> PutativeMatches {
+) -> Result<PutativeMatches, CopyError> {
     let ([batch, n, _], [_, points, _]) = (tokens.dims(), target.dims());
-    let [sources, token_clouds, targets] = [source, tokens, target].map(HostClouds::read);
+    let (sources, token_clouds) = (HostClouds::read(source)?, HostClouds::read(tokens)?);
+    let targets = HostClouds::read(target)?;
     let mut chosen = Vec::with_capacity(batch * n);
     let (mut of_source, mut of_target) = (Vec::new(), Vec::new());
     let clouds = sources.iter().zip(token_clouds.iter()).zip(targets.iter());
@@ -53,12 +54,12 @@ pub(super) fn putative(
     let features = |values: Vec<f32>| {
         Tensor::from_data(TensorData::new(values, [batch * n, fpfh::WIDTH]), (&device, tokens.dtype()))
     };
-    PutativeMatches {
+    Ok(PutativeMatches {
         source: tokens.clone(),
         target: rows(target.clone().reshape([batch * points, 3]), &chosen).reshape([batch, n, 3]),
         source_features: features(of_source),
         target_features: features(of_target),
-    }
+    })
 }
 
 fn describe(cloud: &[[f32; 3]], radius: f64) -> Vec<Descriptor> {
@@ -67,13 +68,13 @@ fn describe(cloud: &[[f32; 3]], radius: f64) -> Vec<Descriptor> {
 }
 
 /// Row numbers of the `kept` most similar of the `n` matches of each pair, ties to the first.
-pub(super) fn most_similar(similarity: &Tensor<2>, n: usize, kept: usize) -> Vec<i64> {
-    let values = similarity.try_to_vec_as::<f32>().unwrap_or_default();
+pub(super) fn most_similar(similarity: &Tensor<2>, n: usize, kept: usize) -> Result<Vec<i64>, CopyError> {
+    let values: Vec<f32> = to_host(similarity)?;
     let mut chosen = Vec::new();
     for (pair, values) in values.chunks_exact(n.max(1)).enumerate() {
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|&a, &b| values[b].total_cmp(&values[a]).then(a.cmp(&b)));
         chosen.extend(order.into_iter().take(kept).map(|i| (pair * n + i) as i64));
     }
-    chosen
+    Ok(chosen)
 }

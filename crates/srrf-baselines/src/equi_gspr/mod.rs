@@ -25,8 +25,8 @@ use burn::tensor::{Device, Tensor};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
-use srrf_model::ops::{even_tokens, rows};
-use srrf_model::{NetworkConfig, WrongSize, transform, weighted_procrustes};
+use srrf_model::ops::{even_tokens, rows, to_host};
+use srrf_model::{CopyError, NetworkConfig, WrongSize, transform, weighted_procrustes};
 
 use crate::learned::{LearnedConfig, Lesson, Pose};
 use crate::se3::constant;
@@ -148,24 +148,27 @@ struct Scored {
 impl EquiGsprConfig {
     /// The pose from putative matches of any origin: whatever describes points in
     /// [`PutativeMatches::WIDTH`] numbers.
-    pub fn pose_of(&self, network: &EquiGspr, matches: PutativeMatches) -> Pose {
-        Self::fit(&self.score(network, matches))
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give its numbers.
+    pub fn pose_of(&self, network: &EquiGspr, matches: PutativeMatches) -> Result<Pose, CopyError> {
+        Self::fit(&self.score(network, matches)?)
     }
 
     /// Finds and scores matches.
-    fn forward(&self, network: &EquiGspr, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Scored {
-        let tokens = even_tokens(source.clone(), self.tokens, phase);
-        let found = matches::putative(&source, &tokens, &target, self.feature_radius);
+    fn forward(&self, network: &EquiGspr, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Result<Scored, CopyError> {
+        let tokens = even_tokens(source.clone(), self.tokens, phase)?;
+        let found = matches::putative(&source, &tokens, &target, self.feature_radius)?;
         self.score(network, found)
     }
 
-    fn score(&self, network: &EquiGspr, found: PutativeMatches) -> Scored {
+    fn score(&self, network: &EquiGspr, found: PutativeMatches) -> Result<Scored, CopyError> {
         let [batch, n, _] = found.source.dims();
         // One graph a cloud, over the same matches; the layers are shared.
         let points = Tensor::cat(vec![found.source.clone(), found.target.clone()], 0); // [2 batch, n, 3]
         let features = Tensor::cat(vec![found.source_features, found.target_features], 0);
         let features = linear(&network.embedding, features, Activation::None); // [2 batch * n, width]
-        let neighbours = graph::neighbours(&points, self.neighbours);
+        let neighbours = graph::neighbours(&points, self.neighbours)?;
         let mut state = (points.reshape([2 * batch * n, 3]), features);
         for layer in &network.layers {
             state = layer.forward(state.0, state.1, &neighbours, self.neighbours);
@@ -177,27 +180,27 @@ impl EquiGsprConfig {
         let similarity = sigmoid(similarity); // [batch * n, 1]
 
         let kept = self.kept.min(n);
-        let chosen = matches::most_similar(&similarity, n, kept);
+        let chosen = matches::most_similar(&similarity, n, kept)?;
         let joined = rows(Tensor::cat(vec![of_source, of_target], 1), &chosen);
         let x = network.head.iter().fold(joined, |x, layer| linear(layer, x, Activation::Relu));
         let score = linear(&network.score, x, Activation::Sigmoid);
         let pick =
             |points: Tensor<3>| rows(points.reshape([batch * n, 3]), &chosen).reshape([batch, kept, 3]);
-        Scored {
+        Ok(Scored {
             source: pick(found.source),
             target: pick(found.target),
             similarity: rows(similarity, &chosen).reshape([batch, kept]),
             score: score.reshape([batch, kept]),
-        }
+        })
     }
 
     /// The pose from the kept matches, by similarity and score.
-    fn fit(scored: &Scored) -> Pose {
+    fn fit(scored: &Scored) -> Result<Pose, CopyError> {
         let weights = scored.similarity.clone() * scored.score.clone() + 1e-6;
         let weights = weights.clone() / weights.sum_dim(1);
         let (rotation, translation) =
-            weighted_procrustes(scored.source.clone(), scored.target.clone(), weights.unsqueeze_dim::<3>(2));
-        Pose { rotation, translation }
+            weighted_procrustes(scored.source.clone(), scored.target.clone(), weights.unsqueeze_dim::<3>(2))?;
+        Ok(Pose { rotation, translation })
     }
 }
 
@@ -211,11 +214,11 @@ impl LearnedConfig for EquiGsprConfig {
         losses: &EquiGsprLosses,
         network: &EquiGspr,
         lesson: &Lesson,
-    ) -> Vec<(&'static str, Tensor<1>, f64)> {
-        let scored = self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase);
+    ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError> {
+        let scored = self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase)?;
         let truth = (lesson.rotation.clone(), lesson.translation.clone());
-        let labels = labels(&scored, truth.clone(), self.match_radius);
-        let found = Self::fit(&scored);
+        let labels = labels(&scored, truth.clone(), self.match_radius)?;
+        let found = Self::fit(&scored)?;
         let chord = (found.rotation - truth.0).square().sum_dim(2).sum_dim(1) / 2.0;
         let rotation = chord.clamp_min(1e-12).sqrt().mean();
         let shift = (found.translation - truth.1).square().sum_dim(1);
@@ -224,24 +227,24 @@ impl LearnedConfig for EquiGsprConfig {
         let wrong = (labels.clone().neg() + 1.0) * (p.clone().neg() + 1.0).log();
         let scores = -(labels.clone() * p.log() + wrong).mean();
         let similarity = (scored.similarity - labels).square().mean();
-        vec![
+        Ok(vec![
             ("rotation", rotation, losses.rotation),
             ("translation", translation, losses.translation),
             ("scores", scores, losses.scores),
             ("similarity", similarity, losses.similarity),
-        ]
+        ])
     }
 
-    fn pose(&self, network: &EquiGspr, source: Tensor<3>, target: Tensor<3>) -> Pose {
-        Self::fit(&self.forward(network, source, target, 0.5))
+    fn pose(&self, network: &EquiGspr, source: Tensor<3>, target: Tensor<3>) -> Result<Pose, CopyError> {
+        Self::fit(&self.forward(network, source, target, 0.5)?)
     }
 }
 
 /// Which matches the true pose confirms, 1 or 0: `[batch, kept]`.
-fn labels(scored: &Scored, (rotation, translation): (Tensor<3>, Tensor<2>), radius: f64) -> Tensor<2> {
+fn labels(scored: &Scored, (rotation, translation): (Tensor<3>, Tensor<2>), radius: f64) -> Result<Tensor<2>, CopyError> {
     let [batch, kept, _] = scored.source.dims();
     let apart = transform(scored.source.clone(), rotation, translation) - scored.target.clone();
-    let apart = apart.square().sum_dim(2).try_to_vec_as::<f64>().unwrap_or_default();
+    let apart: Vec<f64> = to_host(&apart.square().sum_dim(2))?;
     let labels: Vec<f64> = apart.iter().map(|d| f64::from(*d < radius * radius)).collect();
-    constant(&labels, [batch, kept], &scored.source)
+    Ok(constant(&labels, [batch, kept], &scored.source))
 }

@@ -3,7 +3,7 @@
 use burn::tensor::Tensor;
 use nalgebra::SMatrix;
 use srrf_model::fast::{Activation, linear};
-use srrf_model::ops::rows;
+use srrf_model::ops::{CopyError, rows, to_host};
 use srrf_model::transform;
 
 use super::PointNetLk;
@@ -35,14 +35,14 @@ pub(super) fn finite_difference(network: &PointNetLk, cloud: &Tensor<3>, feature
 ///
 /// # Shapes
 /// - `cloud`: `[batch, n, 3]`; output: `[batch, features, 6]`
-pub(super) fn analytic(network: &PointNetLk, cloud: &Tensor<3>) -> Tensor<3> {
+pub(super) fn analytic(network: &PointNetLk, cloud: &Tensor<3>) -> Result<Tensor<3>, CopyError> {
     let [batch, n, _] = cloud.dims();
     let table = cloud.clone().reshape([batch * n, 3]);
     let embedded = network.embed(table.clone()).detach();
     let [_, features] = embedded.dims();
-    let best = rows_of_maxima(&embedded, n); // batch * features
+    let best = rows_of_maxima(&embedded, n)?; // batch * features
     let points = rows(table, &best);
-    let Some((last, before)) = network.layers.split_last() else { return identity(batch, 6, cloud) };
+    let Some((last, before)) = network.layers.split_last() else { return Ok(identity(batch, 6, cloud)) };
 
     // Forward to the last layer but one at these points, keeping where each ReLU lets through.
     let (mut x, mut open) = (points.clone(), Vec::with_capacity(before.len()));
@@ -56,13 +56,13 @@ pub(super) fn analytic(network: &PointNetLk, cloud: &Tensor<3>) -> Tensor<3> {
     for (layer, open) in before.iter().zip(open).rev() {
         gradient = (gradient * open).matmul(layer.weight.val().transpose());
     }
-    Tensor::cat(vec![cross(&points, &gradient), gradient], 1).reshape([batch, features, 6])
+    Ok(Tensor::cat(vec![cross(&points, &gradient), gradient], 1).reshape([batch, features, 6]))
 }
 
 /// The row of the largest value of each column, among the `n` rows of each cloud.
-fn rows_of_maxima(x: &Tensor<2>, n: usize) -> Vec<i64> {
+fn rows_of_maxima(x: &Tensor<2>, n: usize) -> Result<Vec<i64>, CopyError> {
     let [_, columns] = x.dims();
-    let values = x.try_to_vec_as::<f32>().unwrap_or_default();
+    let values: Vec<f32> = to_host(x)?;
     let mut best = Vec::new();
     for (cloud, values) in values.chunks_exact((n * columns).max(1)).enumerate() {
         let mut top = vec![(f32::NEG_INFINITY, 0); columns];
@@ -75,7 +75,7 @@ fn rows_of_maxima(x: &Tensor<2>, n: usize) -> Vec<i64> {
         }
         best.extend(top.into_iter().map(|(_, i)| (cloud * n + i) as i64));
     }
-    best
+    Ok(best)
 }
 
 /// Row by row `a x b`, both `[rows, 3]`.
@@ -89,7 +89,7 @@ fn cross(a: &Tensor<2>, b: &Tensor<2>) -> Tensor<2> {
 ///
 /// # Shapes
 /// - `jacobian`: `[batch, features, 6]`; output: `[batch, 6, features]`
-pub(super) fn pseudo_inverse(jacobian: Tensor<3>) -> Tensor<3> {
+pub(super) fn pseudo_inverse(jacobian: Tensor<3>) -> Result<Tensor<3>, CopyError> {
     let [batch, _, _] = jacobian.dims();
     let transposed = jacobian.clone().transpose();
     let normal = transposed.clone().matmul(jacobian);
@@ -97,7 +97,7 @@ pub(super) fn pseudo_inverse(jacobian: Tensor<3>) -> Tensor<3> {
     let mean = diagonal.sum_dim(2).sum_dim(1) / 6.0; // [batch, 1, 1]
     let damped =
         normal.clone() + identity(batch, 6, &normal) * (mean * DAMPING + f64::from(f32::MIN_POSITIVE));
-    inverse(damped).matmul(transposed)
+    Ok(inverse(damped)?.matmul(transposed))
 }
 
 /// The inverse, from the host in `f64`. One Newton step, whose value is that of its start, carries the
@@ -105,9 +105,9 @@ pub(super) fn pseudo_inverse(jacobian: Tensor<3>) -> Tensor<3> {
 ///
 /// # Shapes
 /// - `matrices` and output: `[batch, 6, 6]`
-fn inverse(matrices: Tensor<3>) -> Tensor<3> {
+fn inverse(matrices: Tensor<3>) -> Result<Tensor<3>, CopyError> {
     let [batch, _, _] = matrices.dims();
-    let values = matrices.try_to_vec_as::<f64>().unwrap_or_default();
+    let values: Vec<f64> = to_host(&matrices)?;
     let bad = SMatrix::<f64, 6, 6>::repeat(f64::NAN);
     let inverses: Vec<f64> = values
         .chunks_exact(36)
@@ -118,7 +118,7 @@ fn inverse(matrices: Tensor<3>) -> Tensor<3> {
         .collect();
     let found = constant(&inverses, [batch, 6, 6], &matrices);
     let change = matrices.clone() - matrices.detach(); // zero, with the derivative of H
-    found.clone() - found.clone().matmul(change).matmul(found)
+    Ok(found.clone() - found.clone().matmul(change).matmul(found))
 }
 
 #[cfg(test)]
@@ -142,7 +142,7 @@ mod tests {
         let cloud = cloud(2, 31, &device);
         let feature = network.feature(cloud.clone());
         let differences = finite_difference(&network, &cloud, &feature).try_to_vec_as::<f64>().unwrap();
-        let exact = analytic(&network, &cloud).try_to_vec_as::<f64>().unwrap();
+        let exact = analytic(&network, &cloud).unwrap().try_to_vec_as::<f64>().unwrap();
         let largest = exact.iter().fold(0.0_f64, |a, v| a.max(v.abs()));
         // A step of 0.01 turns a maximum over to another point, or a ReLU, here and there.
         let off = exact.iter().zip(&differences).filter(|(a, b)| (*a - *b).abs() > 0.02 * largest).count();
@@ -167,9 +167,9 @@ mod tests {
         };
         let weights =
             constant(&(0..36).map(|i| f64::from(i).cos()).collect::<Vec<_>>(), [1, 6, 6], &tensor(0.0));
-        let value = |t: Tensor<3>| (inverse(t) * weights.clone()).sum();
+        let value = |t: Tensor<3>| (inverse(t).unwrap() * weights.clone()).sum();
         let h = tensor(0.0);
-        let product = inverse(h.clone()).matmul(h.clone()).try_to_vec_as::<f64>().unwrap();
+        let product = inverse(h.clone()).unwrap().matmul(h.clone()).try_to_vec_as::<f64>().unwrap();
         assert!(product.iter().enumerate().all(|(i, v)| (v - f64::from(i % 7 == 0)).abs() < 1e-10));
         let gradient = h.grad(&value(h.clone()).backward()).unwrap().try_to_vec_as::<f64>().unwrap()[8];
         let (up, down) =

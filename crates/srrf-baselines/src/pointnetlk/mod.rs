@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
 use srrf_model::ops::even_tokens;
-use srrf_model::{NetworkConfig, WrongSize, transform};
+use srrf_model::{CopyError, NetworkConfig, WrongSize, transform};
 
 use crate::dgcnn::max_over;
 use crate::learned::{LearnedConfig, Lesson, Pose};
@@ -133,16 +133,16 @@ impl PointNetLkConfig {
         target: Tensor<3>,
         iterations: usize,
         phase: f32,
-    ) -> (Tensor<3>, Tensor<2>) {
-        let source = even_tokens(source, self.points, phase);
-        let target = even_tokens(target, self.points, phase);
+    ) -> Result<(Tensor<3>, Tensor<2>), CopyError> {
+        let source = even_tokens(source, self.points, phase)?;
+        let target = even_tokens(target, self.points, phase)?;
         let [batch, _, _] = source.dims();
         let feature = network.feature(target.clone()); // [batch, features]
         let j = match self.jacobian {
             LkJacobian::FiniteDifference => jacobian::finite_difference(network, &target, &feature),
-            LkJacobian::Analytic => jacobian::analytic(network, &target),
+            LkJacobian::Analytic => jacobian::analytic(network, &target)?,
         }; // [batch, features, 6]
-        let inverse = jacobian::pseudo_inverse(j); // [batch, 6, features]
+        let inverse = jacobian::pseudo_inverse(j)?; // [batch, 6, features]
         let mut motion = identity(batch, 4, &source);
         let mut residual = feature.clone();
         for _ in 0..iterations {
@@ -151,7 +151,7 @@ impl PointNetLkConfig {
             let step = inverse.clone().matmul(residual.clone().unsqueeze_dim::<3>(2)); // [batch, 6, 1]
             motion = exp(-step.squeeze_dim::<2>(2)).matmul(motion);
         }
-        (motion, residual)
+        Ok((motion, residual))
     }
 }
 
@@ -165,9 +165,9 @@ impl LearnedConfig for PointNetLkConfig {
         losses: &PointNetLkLosses,
         network: &PointNetLk,
         lesson: &Lesson,
-    ) -> Vec<(&'static str, Tensor<1>, f64)> {
+    ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError> {
         let (source, target) = (lesson.source.clone(), lesson.target.clone());
-        let (motion, residual) = self.align(network, source, target, self.iterations, lesson.phase);
+        let (motion, residual) = self.align(network, source, target, self.iterations, lesson.phase)?;
         let (rotation, translation) = parts(motion);
         // G G_gt^-1 = [R R_gt^T, t - R R_gt^T t_gt]; the last row of the difference is 0.
         let turned = rotation.matmul(lesson.rotation.clone().transpose());
@@ -176,13 +176,14 @@ impl LearnedConfig for PointNetLkConfig {
         let shift = translation - moved.squeeze_dim::<2>(2);
         let difference = (turned.clone() - identity(batch, 3, &turned)).square().sum() + shift.square().sum();
         let residual = residual.square().sum() / batch as f64;
-        vec![("residual", residual, losses.residual), ("pose", difference / (16 * batch) as f64, losses.pose)]
+        let pose = difference / (16 * batch) as f64;
+        Ok(vec![("residual", residual, losses.residual), ("pose", pose, losses.pose)])
     }
 
-    fn pose(&self, network: &PointNetLk, source: Tensor<3>, target: Tensor<3>) -> Pose {
-        let (motion, _) = self.align(network, source, target, self.test_iterations, 0.5);
+    fn pose(&self, network: &PointNetLk, source: Tensor<3>, target: Tensor<3>) -> Result<Pose, CopyError> {
+        let (motion, _) = self.align(network, source, target, self.test_iterations, 0.5)?;
         let (rotation, translation) = parts(motion);
-        Pose { rotation, translation }
+        Ok(Pose { rotation, translation })
     }
 
     fn passes(&self) -> usize {

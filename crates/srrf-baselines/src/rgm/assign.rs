@@ -1,7 +1,7 @@
 //! One-to-one matches of an assignment: the Hungarian method.
 
 use burn::tensor::{Tensor, TensorData};
-use srrf_model::ops::rows;
+use srrf_model::ops::{CopyError, rows, to_host};
 
 /// A node whose row or column sums to less has no match.
 const LEAST_SUM: f64 = 0.5;
@@ -12,9 +12,9 @@ const LEAST_SUM: f64 = 0.5;
 /// # Shapes
 /// - `assignment`: `[batch, n, m]`, `target_points`: `[batch, m, 3]`
 /// - output: `[batch, n, 3]` and `[batch, n, 1]`
-pub(super) fn one_to_one(assignment: &Tensor<3>, target_points: &Tensor<3>) -> (Tensor<3>, Tensor<3>) {
+pub(super) fn one_to_one(assignment: &Tensor<3>, target_points: &Tensor<3>) -> Result<(Tensor<3>, Tensor<3>), CopyError> {
     let [batch, n, m] = assignment.dims();
-    let values = assignment.try_to_vec_as::<f64>().unwrap_or_default();
+    let values: Vec<f64> = to_host(assignment)?;
     let (mut chosen, mut weights) = (Vec::with_capacity(batch * n), Vec::with_capacity(batch * n));
     for (cloud, s) in values.chunks_exact((n * m).max(1)).enumerate() {
         let columns = hungarian(s, n, m);
@@ -34,7 +34,8 @@ pub(super) fn one_to_one(assignment: &Tensor<3>, target_points: &Tensor<3>) -> (
     }
     let points = rows(target_points.clone().reshape([batch * m, 3]), &chosen).reshape([batch, n, 3]);
     let device = assignment.device().without_autodiff();
-    (points, Tensor::from_data(TensorData::new(weights, [batch, n, 1]), (&device, assignment.dtype())))
+    let weights = TensorData::new(weights, [batch, n, 1]);
+    Ok((points, Tensor::from_data(weights, (&device, assignment.dtype()))))
 }
 
 /// The assignment of rows to columns with the largest sum of `scores` (`n x m`, row-major): the column

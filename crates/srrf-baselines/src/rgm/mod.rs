@@ -16,7 +16,7 @@ use burn::tensor::{Device, Tensor};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::ops::even_tokens;
-use srrf_model::{NetworkConfig, WrongSize, sinkhorn, transform, weighted_procrustes};
+use srrf_model::{CopyError, NetworkConfig, WrongSize, sinkhorn, transform, weighted_procrustes};
 
 use crate::dgcnn::{Dgcnn, halves};
 use crate::learned::{LearnedConfig, Lesson, Pose};
@@ -147,10 +147,10 @@ impl RgmConfig {
         self.widths.iter().sum::<usize>() + self.width
     }
 
-    fn forward(&self, network: &Rgm, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Matched {
+    fn forward(&self, network: &Rgm, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Result<Matched, CopyError> {
         let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
-        let tokens = even_tokens(clouds.clone(), self.tokens, phase); // [2 batch, n, 3]
-        let (edge, node) = network.features.forward(&tokens, &clouds);
+        let tokens = even_tokens(clouds.clone(), self.tokens, phase)?; // [2 batch, n, 3]
+        let (edge, node) = network.features.forward(&tokens, &clouds)?;
         let mut nodes = Tensor::cat(vec![node, edge], 2); // [2 batch, n, joined]
         let (source_points, target_points) = halves(tokens);
         let [batch, n, _] = source_points.dims();
@@ -160,7 +160,7 @@ impl RgmConfig {
             assignment = sinkhorn(layer.affinity(nodes.clone()), self.sinkhorn).matrix();
             nodes = layer.mix(nodes, &assignment);
         }
-        Matched { source_points, target_points, assignment }
+        Ok(Matched { source_points, target_points, assignment })
     }
 }
 
@@ -174,18 +174,18 @@ impl LearnedConfig for RgmConfig {
         losses: &RgmLosses,
         network: &Rgm,
         lesson: &Lesson,
-    ) -> Vec<(&'static str, Tensor<1>, f64)> {
-        let found = self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase);
+    ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError> {
+        let found = self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase)?;
         let posed = transform(found.source_points, lesson.rotation.clone(), lesson.translation.clone());
-        let truth = truth::assignment(&posed, &found.target_points, self.match_radius);
+        let truth = truth::assignment(&posed, &found.target_points, self.match_radius)?;
         let [batch, n, _] = truth.dims();
         let s = found.assignment.clamp(1e-6, 1.0 - 1e-6);
         let no_match = (s.clone().neg() + 1.0).log() * (truth.clone().neg() + 1.0);
         let loss = -(truth * s.log() + no_match).sum() / (batch * n) as f64;
-        vec![("assignment", loss, losses.assignment)]
+        Ok(vec![("assignment", loss, losses.assignment)])
     }
 
-    fn pose(&self, network: &Rgm, source: Tensor<3>, target: Tensor<3>) -> Pose {
+    fn pose(&self, network: &Rgm, source: Tensor<3>, target: Tensor<3>) -> Result<Pose, CopyError> {
         let mut pose: Option<(Tensor<3>, Tensor<2>)> = None;
         for _ in 0..self.iterations {
             let moved = match &pose {
@@ -194,9 +194,9 @@ impl LearnedConfig for RgmConfig {
                 }
                 None => source.clone(),
             };
-            let found = self.forward(network, moved, target.clone(), 0.5);
-            let (matches, weights) = assign::one_to_one(&found.assignment, &found.target_points);
-            let step = weighted_procrustes(found.source_points, matches, weights);
+            let found = self.forward(network, moved, target.clone(), 0.5)?;
+            let (matches, weights) = assign::one_to_one(&found.assignment, &found.target_points)?;
+            let step = weighted_procrustes(found.source_points, matches, weights)?;
             pose = Some(match pose {
                 Some(before) => compose(step, before),
                 None => step,
@@ -206,7 +206,7 @@ impl LearnedConfig for RgmConfig {
             let [batch, _, _] = source.dims();
             (crate::se3::identity(batch, 3, &source), Tensor::zeros([batch, 3], &source.device()))
         });
-        Pose { rotation, translation }
+        Ok(Pose { rotation, translation })
     }
 
     fn passes(&self) -> usize {

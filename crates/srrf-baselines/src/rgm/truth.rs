@@ -1,7 +1,7 @@
 //! The assignment that RGM learns.
 
 use burn::tensor::Tensor;
-use srrf_model::ops::{HostClouds, nearest};
+use srrf_model::ops::{CopyError, HostClouds, nearest};
 
 use crate::se3::constant;
 
@@ -12,9 +12,9 @@ use crate::se3::constant;
 /// # Shapes
 /// - `posed`: the source nodes under the true pose, `[batch, n, 3]`; `target`: `[batch, m, 3]`
 /// - output: `[batch, n, m]`
-pub(super) fn assignment(posed: &Tensor<3>, target: &Tensor<3>, radius: f64) -> Tensor<3> {
+pub(super) fn assignment(posed: &Tensor<3>, target: &Tensor<3>, radius: f64) -> Result<Tensor<3>, CopyError> {
     let ([batch, n, _], [_, m, _]) = (posed.dims(), target.dims());
-    let (sources, targets) = (HostClouds::read(posed), HostClouds::read(target));
+    let (sources, targets) = (HostClouds::read(posed)?, HostClouds::read(target)?);
     let mut truth = vec![0.0_f64; batch * n * m];
     for (cloud, (source, target)) in sources.iter().zip(targets.iter()).enumerate() {
         let (forth, back) = (nearest(source, target), nearest(target, source));
@@ -37,7 +37,7 @@ pub(super) fn assignment(posed: &Tensor<3>, target: &Tensor<3>, radius: f64) -> 
         left.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
         left.into_iter().for_each(|(_, i, j)| keep(i, j, 2.0 * radius));
     }
-    constant(&truth, [batch, n, m], posed)
+    Ok(constant(&truth, [batch, n, m], posed))
 }
 
 fn distance(a: &[f32; 3], b: &[f32; 3]) -> f64 {
@@ -57,7 +57,7 @@ mod tests {
             Tensor::<3>::from_data(TensorData::new(values, [1, x.len(), 3]), &Device::flex())
         };
         // 0 with 0; 1.0 and 1.04 compete for 1.01; 1.04 then gets 1.12, within twice the radius; 3 none.
-        let truth = assignment(&cloud(&[0.0, 1.0, 1.04, 3.0]), &cloud(&[1.01, 0.01, 1.12]), 0.05);
+        let truth = assignment(&cloud(&[0.0, 1.0, 1.04, 3.0]), &cloud(&[1.01, 0.01, 1.12]), 0.05).unwrap();
         let found = truth.try_to_vec_as::<f64>().unwrap();
         assert_eq!(found, [0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
     }

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::defaults;
-use crate::ops::{distance, nearest_distance, nearest_rows, rows};
+use crate::ops::{CopyError, distance, nearest_distance, nearest_rows, rows};
 use crate::procrustes::transform;
 use crate::sem::Skeleton;
 
@@ -58,8 +58,11 @@ pub struct SkeletonLoss {
 ///
 /// # Shapes
 /// - `a`: `[clouds, n, 3]`, `b`: `[clouds, m, 3]`; output `[1]`
-pub fn chamfer(a: Tensor<3>, b: Tensor<3>) -> Tensor<1> {
-    nearest_distance(a.clone(), b.clone()).mean() + nearest_distance(b, a).mean()
+///
+/// # Errors
+/// [`CopyError`] where the coordinates cannot be copied to the host, which finds the nearest points.
+pub fn chamfer(a: Tensor<3>, b: Tensor<3>) -> Result<Tensor<1>, CopyError> {
+    Ok(nearest_distance(a.clone(), b.clone())?.mean() + nearest_distance(b, a)?.mean())
 }
 
 /// The skeleton losses of a batch of pairs.
@@ -67,24 +70,27 @@ pub fn chamfer(a: Tensor<3>, b: Tensor<3>) -> Tensor<1> {
 /// # Shapes
 /// - `source`, `target`: `[batch, points, 3]`; `rotation`: `[batch, 3, 3]`, `translation`: `[batch, 3]`,
 ///   the true pose (target ~ R source + t)
+///
+/// # Errors
+/// As [`chamfer`].
 pub fn skeleton_loss(
     config: &SkeletonLossConfig,
     (source, source_skeleton): (Tensor<3>, &Skeleton),
     (target, target_skeleton): (Tensor<3>, &Skeleton),
     rotation: Tensor<3>,
     translation: Tensor<2>,
-) -> SkeletonLoss {
+) -> Result<SkeletonLoss, CopyError> {
     let clouds = Tensor::cat(vec![source, target], 0);
     let points = Tensor::cat(vec![source_skeleton.points.clone(), target_skeleton.points.clone()], 0);
     let radii = Tensor::cat(vec![source_skeleton.radii.clone(), target_skeleton.radii.clone()], 0);
 
-    let sampling = chamfer(sphere_samples(points.clone(), radii.clone()), clouds.clone()); // L_s
-    let point_to_sphere = point_to_sphere(clouds, points, radii.clone()); // L_p
+    let sampling = chamfer(sphere_samples(points.clone(), radii.clone()), clouds.clone())?; // L_s
+    let point_to_sphere = point_to_sphere(clouds, points, radii.clone())?; // L_p
     let radius = -radii.mean(); // L_r
 
     // L_ddl between the source skeleton under the true pose and the target skeleton.
     let posed = transform(source_skeleton.points.clone(), rotation, translation);
-    let distribution = chamfer(posed.clone(), target_skeleton.points.clone());
+    let distribution = chamfer(posed.clone(), target_skeleton.points.clone())?;
     // The spread is on the graph: without its gradient, shrinking the skeleton would be the cheapest way to lower
     // what is divided by it.
     let spread = spread(target_skeleton.points.clone()).clamp_min(1e-3);
@@ -97,7 +103,7 @@ pub fn skeleton_loss(
         + distribution.clone() * config.distribution
         + distribution_over_spread.clone() * config.distribution_over_spread
         + index_match.clone() * config.index_match;
-    SkeletonLoss {
+    Ok(SkeletonLoss {
         sampling,
         point_to_sphere,
         radius,
@@ -105,7 +111,7 @@ pub fn skeleton_loss(
         distribution_over_spread,
         index_match,
         total,
-    }
+    })
 }
 
 /// Eight samples on each sphere, `s + r (+-1, +-1, +-1) / sqrt(3)`: `[clouds, 8 m, 3]`.
@@ -122,15 +128,15 @@ fn sphere_samples(points: Tensor<3>, radii: Tensor<2>) -> Tensor<3> {
 
 /// `L_p`: how far each point is from the sphere of its nearest skeleton point, and each sphere
 /// from its nearest point.
-fn point_to_sphere(clouds: Tensor<3>, points: Tensor<3>, radii: Tensor<2>) -> Tensor<1> {
+fn point_to_sphere(clouds: Tensor<3>, points: Tensor<3>, radii: Tensor<2>) -> Result<Tensor<1>, CopyError> {
     let [batch, n, _] = clouds.dims();
     let [_, m, _] = points.dims();
-    let nearest = nearest_rows(&clouds, &points);
+    let nearest = nearest_rows(&clouds, &points)?;
     let centres = rows(points.clone().reshape([batch * m, 3]), &nearest);
     let near_radii = rows(radii.clone().reshape([batch * m, 1]), &nearest).squeeze_dim::<1>(1);
     let to_sphere = (distance(clouds.clone().reshape([batch * n, 3]) - centres) - near_radii).abs().mean();
-    let to_cloud = (nearest_distance(points, clouds) - radii).abs().mean();
-    to_sphere + to_cloud
+    let to_cloud = (nearest_distance(points, clouds)? - radii).abs().mean();
+    Ok(to_sphere + to_cloud)
 }
 
 /// Mean distance between skeleton points of the same number.

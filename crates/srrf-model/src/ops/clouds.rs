@@ -3,6 +3,8 @@
 use burn::tensor::Tensor;
 use rayon::prelude::*;
 
+use crate::ops::copy::{CopyError, to_host};
+
 /// A batch of clouds copied to the host: shape `[batch, points, 3]`.
 #[derive(Debug, Clone)]
 pub struct HostClouds {
@@ -27,11 +29,14 @@ impl HostClouds {
     }
 
     /// Copies `clouds`, shape `[batch, points, 3]`.
-    pub fn read(clouds: &Tensor<3>) -> Self {
+    ///
+    /// # Errors
+    /// [`CopyError`] where the device does not give them.
+    pub fn read(clouds: &Tensor<3>) -> Result<Self, CopyError> {
         let [_, per_cloud, _] = clouds.dims();
-        let flat: Vec<f32> = clouds.try_to_vec_as::<f32>().unwrap_or_default();
+        let flat: Vec<f32> = to_host(clouds)?;
         let points = flat.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
-        Self { points, per_cloud }
+        Ok(Self { points, per_cloud })
     }
 
     /// The clouds one by one.

@@ -3,6 +3,7 @@
 use burn::tensor::Tensor;
 
 use crate::ops::clouds::{HostClouds, flat_indices};
+use crate::ops::copy::CopyError;
 use crate::ops::gather::rows;
 use crate::ops::neighbours::nearest;
 
@@ -19,20 +20,23 @@ pub(crate) fn squared_distances(a: &Tensor<3>, b: &Tensor<3>) -> Tensor<3> {
 /// # Shapes
 /// - `points`: `[clouds, n, 3]`, `support`: `[clouds, m, 3]`
 /// - output: `[clouds, n]`
-pub fn nearest_distance(points: Tensor<3>, support: Tensor<3>) -> Tensor<2> {
+///
+/// # Errors
+/// [`CopyError`] where the coordinates cannot be copied.
+pub fn nearest_distance(points: Tensor<3>, support: Tensor<3>) -> Result<Tensor<2>, CopyError> {
     let [clouds, n, _] = points.dims();
-    let nearest = nearest_rows(&points, &support);
+    let nearest = nearest_rows(&points, &support)?;
     let [_, m, _] = support.dims();
     let matched = rows(support.reshape([clouds * m, 3]), &nearest);
-    distance(points.reshape([clouds * n, 3]) - matched).reshape([clouds, n])
+    Ok(distance(points.reshape([clouds * n, 3]) - matched).reshape([clouds, n]))
 }
 
 /// Row numbers, in the flattened support, of the nearest support point of each point.
-pub(crate) fn nearest_rows(points: &Tensor<3>, support: &Tensor<3>) -> Vec<i64> {
+pub(crate) fn nearest_rows(points: &Tensor<3>, support: &Tensor<3>) -> Result<Vec<i64>, CopyError> {
     let [_, m, _] = support.dims();
-    let (points, support) = (HostClouds::read(points), HostClouds::read(support));
+    let (points, support) = (HostClouds::read(points)?, HostClouds::read(support)?);
     let supports: Vec<_> = support.iter().collect();
-    flat_indices(&points, m, |i, cloud| nearest(cloud, supports[i]))
+    Ok(flat_indices(&points, m, |i, cloud| nearest(cloud, supports[i])))
 }
 
 /// Norm of each row, floored at 1e-6. Shape `[rows, 3]` to `[rows]`.

@@ -2,6 +2,7 @@
 //! All of it is deterministic.
 
 mod clouds;
+mod copy;
 mod distance;
 mod gather;
 mod neighbours;
@@ -9,6 +10,7 @@ mod sampling;
 pub(crate) mod simd;
 
 pub use clouds::{HostClouds, flat_indices};
+pub use copy::{CopyError, to_host};
 pub use distance::nearest_distance;
 pub(crate) use distance::{distance, nearest_rows, squared_distances};
 pub(crate) use gather::on_cubecl;

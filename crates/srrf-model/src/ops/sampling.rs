@@ -4,6 +4,7 @@
 use burn::tensor::Tensor;
 
 use crate::ops::clouds::{HostClouds, flat_indices};
+use crate::ops::copy::CopyError;
 use crate::ops::gather::rows;
 use crate::ops::neighbours::{Columns, LANES, distinct, squared};
 use crate::ops::simd::vectorized;
@@ -94,12 +95,15 @@ pub fn token_rows(clouds: &HostClouds, tokens: usize, phase: f32) -> Option<Vec<
 }
 
 /// The points at [`token_rows`]: `[batch, tokens, 3]` of `[batch, points, 3]`.
-pub fn even_tokens(clouds: Tensor<3>, tokens: usize, phase: f32) -> Tensor<3> {
+///
+/// # Errors
+/// [`CopyError`] where the coordinates cannot be copied.
+pub fn even_tokens(clouds: Tensor<3>, tokens: usize, phase: f32) -> Result<Tensor<3>, CopyError> {
     let [batch, points, _] = clouds.dims();
-    match token_rows(&HostClouds::read(&clouds), tokens, phase) {
+    Ok(match token_rows(&HostClouds::read(&clouds)?, tokens, phase) {
         Some(chosen) => rows(clouds.reshape([batch * points, 3]), &chosen).reshape([batch, tokens, 3]),
         None => clouds,
-    }
+    })
 }
 
 /// Interleaves the low 10 bits of three numbers.

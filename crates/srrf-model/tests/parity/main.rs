@@ -31,7 +31,7 @@ fn skeleton_module() {
     for reference in Reference::each() {
         let sem = reference.network().sem;
         let clouds = reference.tensor::<3>("sem.clouds");
-        let skeleton = sem.forward(clouds.clone());
+        let skeleton = sem.forward(clouds.clone()).unwrap();
         reference.compare("sem.samples", &skeleton.samples);
         reference.compare("sem.weights", &skeleton.weights);
         reference.compare("sem.points", &skeleton.points);
@@ -68,7 +68,8 @@ fn skeleton_losses() {
                 (target.clone(), &half(1)),
                 reference.tensor("losses.rotation"),
                 reference.tensor("losses.translation"),
-            );
+            )
+            .unwrap();
             let loss = match name {
                 "sampling" => losses.sampling,
                 "point_to_sphere" => losses.point_to_sphere,
@@ -76,7 +77,7 @@ fn skeleton_losses() {
                 "distribution" => losses.distribution,
                 "index_match" => losses.index_match,
                 "total" => losses.total,
-                _ => chamfer(skeletons.clone(), Tensor::cat(vec![source, target], 0)),
+                _ => chamfer(skeletons.clone(), Tensor::cat(vec![source, target], 0)).unwrap(),
             };
             reference.compare(&format!("losses.{name}"), &loss);
             let grads = loss.backward();
@@ -103,7 +104,7 @@ fn structural_features() {
         let sfe = reference.config.dense.sfe.init(&Device::flex());
         let sfe = filled_as(sfe, "dense.sfe", reference.dtype);
         let cloud = reference.tensor::<3>("sfe.cloud");
-        let features = sfe.forward(reference.tensor("sfe.tokens"), cloud.clone());
+        let features = sfe.forward(reference.tensor("sfe.tokens"), cloud.clone()).unwrap();
         reference.compare("sfe.features", &features);
         let grads = reference.weighed(&mut Numbers(7), &features).backward();
         reference.compare_gradient("sfe.gradient.cloud", &cloud, &grads);
@@ -135,7 +136,7 @@ fn matching_and_svd() {
         let inputs = names.map(|name| reference.tensor::<3>(&format!("head.{name}")));
         let [source_features, target_features, source, target] = inputs.clone();
         let found = matching.forward(source_features, target_features, target, None);
-        let (rotation, translation) = procrustes(source, found.points.clone());
+        let (rotation, translation) = procrustes(source, found.points.clone()).unwrap();
         reference.compare("head.matches", &found.points);
         reference.compare("head.probabilities", &found.probabilities);
         reference.compare("head.rotation", &rotation);
@@ -162,7 +163,8 @@ fn whole_network_and_all_losses() {
         let (rotation, translation) =
             (reference.tensor::<3>("whole.rotation"), reference.tensor::<2>("whole.translation"));
         let phase = reference.get::<f32>("phase");
-        let output = network.forward(&reference.config.integration, source.clone(), target.clone(), phase);
+        let output =
+            network.forward(&reference.config.integration, source.clone(), target.clone(), phase).unwrap();
 
         let (x, y) = (&output.source_skeleton, &output.target_skeleton);
         reference.compare("whole.skeletons", &Tensor::cat(vec![x.points.clone(), y.points.clone()], 0));
@@ -198,7 +200,8 @@ fn whole_network_and_all_losses() {
             (target.clone(), y),
             rotation.clone(),
             translation.clone(),
-        );
+        )
+        .unwrap();
         let losses = [
             ("skeleton_loss", skeleton.total),
             ("dense.registration", pose(&output.dense.rotation, &output.dense.translation)),

@@ -198,6 +198,7 @@ pub fn failed(error: &srrf::Error, source: &str, target: &str) -> Failure {
         srrf::Error::Source(e) => Failure::cloud(source, e),
         srrf::Error::Target(e) => Failure::cloud(target, e),
         srrf::Error::Setup(problem) => Failure::usage(problem.clone()),
+        srrf::Error::Device(e) => Failure::failed(e.to_string()),
         srrf::Error::NoPose(_) | srrf::Error::Refine(_) => Failure::failed(format!(
             "{source:?} and {target:?}: {error}; look at both with `srrf inspect`, or give a first guess with --initial"
         )),

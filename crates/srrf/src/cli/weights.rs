@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
-use srrf_model::weights::{LoadedModel, parameters};
+use srrf_model::weights::LoadedModel;
 use srrf_model::{device, embedded};
 
 use srrf_args::Failure;
@@ -65,7 +65,7 @@ fn list() -> Result<String, Failure> {
         let default = if i == 0 { ", the default" } else { "" };
         lines.push(format!(
             "{name:14} {} parameters, SHA-256 {}...{default}",
-            count(parameter_count(&loaded)),
+            count(loaded.parameter_count()),
             &loaded.sha256[..16]
         ));
     }
@@ -91,12 +91,6 @@ fn verify(weights: &str, sha256: Option<&str>) -> Result<String, Failure> {
             )));
         }
     }
-    let all = parameters(&loaded.model);
-    if let Some((name, _)) = all.iter().find(|(_, (_, values))| values.iter().any(|v| !v.is_finite())) {
-        return Err(Failure::usage(format!(
-            "{weights:?}: parameter `{name}` has numbers that are not finite; train it again or get another file"
-        )));
-    }
     let mut same = String::new();
     for name in embedded::names() {
         if open(name)?.sha256 == loaded.sha256 {
@@ -107,7 +101,7 @@ fn verify(weights: &str, sha256: Option<&str>) -> Result<String, Failure> {
     Ok(format!(
         "{weights}: {}, complete, {} parameters, all finite\nSHA-256 {}{same}{matches}",
         loaded.name,
-        count(parameter_count(&loaded)),
+        count(loaded.parameter_count()),
         loaded.sha256
     ))
 }
@@ -115,10 +109,6 @@ fn verify(weights: &str, sha256: Option<&str>) -> Result<String, Failure> {
 fn open(weights: &str) -> Result<LoadedModel, Failure> {
     let device = device("flex").map_err(|e| Failure::failed(e.to_string()))?;
     embedded::open(weights, &device).map_err(|e| Failure::usage(e.to_string()))
-}
-
-fn parameter_count(loaded: &LoadedModel) -> usize {
-    parameters(&loaded.model).values().map(|(_, values)| values.len()).sum()
 }
 
 fn unknown(name: &str) -> Failure {

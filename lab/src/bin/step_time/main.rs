@@ -168,7 +168,7 @@ impl Bench {
         let integration = &self.config.network.integration;
         let one = |pair: &Pair| -> Option<()> {
             let batch = PairBatch::new(&[(&pair.source, &pair.target)], &self.device)?;
-            self.model.forward(integration, batch.source, batch.target, PHASE);
+            self.model.forward(integration, batch.source, batch.target, PHASE).unwrap();
             Some(())
         };
         let workers = Workers::new(arguments.threads)?;

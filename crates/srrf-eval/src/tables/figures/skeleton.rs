@@ -4,6 +4,7 @@ use rand::seq::index;
 use srrf_cloud::{PointCloud, Register, farthest_point_sampling};
 use srrf_corrupt::{Pair, Purpose, Stream};
 use srrf_model::PairBatch;
+use srrf_model::ops::to_host;
 use srrf_model::weights::LoadedModel;
 
 use super::canvas::{BLUE, GREEN, GREY, Grid, RED, View, thinned};
@@ -33,15 +34,15 @@ fn extract(context: &MethodContext, cloud: &PointCloud) -> Result<Extracted, Eva
     let device = srrf_model::device(&context.device).map_err(|e| failed(e.to_string()))?;
     let batch = PairBatch::new(&[(cloud, cloud)], &device)
         .ok_or_else(|| failed("the cloud makes no batch".into()))?;
-    let skeleton = model.sem.forward(batch.source);
+    let skeleton = model.sem.forward(batch.source)?;
     let rows = |values: Vec<f64>| values.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
     let frame = batch.frames[0];
     Ok(Extracted {
         cloud: cloud.points().iter().map(|p| frame.source(p)).collect(),
-        points: rows(skeleton.points.try_to_vec_as::<f64>().unwrap_or_default()),
-        radii: skeleton.radii.try_to_vec_as::<f64>().unwrap_or_default(),
-        samples: rows(skeleton.samples.try_to_vec_as::<f64>().unwrap_or_default()),
-        weights: skeleton.weights.try_to_vec_as::<f64>().unwrap_or_default(),
+        points: rows(to_host(&skeleton.points)?),
+        radii: to_host(&skeleton.radii)?,
+        samples: rows(to_host(&skeleton.samples)?),
+        weights: to_host(&skeleton.weights)?,
     })
 }
 

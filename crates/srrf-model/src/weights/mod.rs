@@ -1,11 +1,14 @@
 //! Weights as safetensors: every parameter under its path, with the network's sizes and a model
 //! card in the header.
 
-use std::collections::{BTreeMap, HashMap};
-use std::path::{Path, PathBuf};
+mod error;
+mod parameters;
 
-use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
-use burn::tensor::{Device, Tensor, TensorData};
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+
+use burn::module::Module;
+use burn::tensor::Device;
 use half::f16;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
@@ -13,62 +16,11 @@ use sha2::{Digest, Sha256};
 use crate::sizes::NetworkConfig;
 use crate::srrf::SrrfConfig;
 
+pub use error::WeightsError;
+pub use parameters::{parameters, with_parameters};
+
 /// Header key of the model's name.
 const NAME_KEY: &str = "name";
-
-/// Why weights could not be read or written.
-#[derive(Debug, thiserror::Error)]
-pub enum WeightsError {
-    /// The file cannot be read or written.
-    #[error("{path}: {source}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        #[source]
-        source: std::io::Error,
-    },
-    /// There is neither a file nor a model in the program of that name.
-    #[error("{name}: no such file, and no model of that name in the program (it has {known})")]
-    Unknown {
-        /// What was asked for.
-        name: String,
-        /// The names of the models in the program.
-        known: String,
-    },
-    /// The bytes are no safetensors file, or a truncated one.
-    #[error("{origin}: not a complete safetensors file: {source}")]
-    Format {
-        /// Where the bytes came from.
-        origin: String,
-        /// What the reader said.
-        #[source]
-        source: safetensors::SafeTensorError,
-    },
-    /// The header does not describe a network of this program.
-    #[error(
-        "{origin}: no network description under `{key}` in the header: {why}; was it written by srrf-train, for \
-         this method?"
-    )]
-    Header {
-        /// Where the bytes came from.
-        origin: String,
-        /// The entry that was looked for.
-        key: &'static str,
-        /// What is wrong.
-        why: String,
-    },
-    /// A parameter is missing, has another shape, or is of an unsupported type.
-    #[error("{origin}: parameter `{name}`: {why}; these weights belong to a network of another architecture")]
-    Parameter {
-        /// Where the bytes came from.
-        origin: String,
-        /// Path of the parameter.
-        name: String,
-        /// What is wrong.
-        why: String,
-    },
-}
 
 /// A network with what its file says about it.
 #[derive(Debug, Clone)]
@@ -85,94 +37,18 @@ pub struct LoadedModel<C: NetworkConfig = SrrfConfig> {
     pub metadata: HashMap<String, String>,
 }
 
-/// The parameters of a module by path, as `(shape, values)`.
-pub fn parameters<M: Module>(module: &M) -> BTreeMap<String, (Vec<usize>, Vec<f32>)> {
-    let mut collector = Collector { path: Vec::new(), found: BTreeMap::new() };
-    module.visit(&mut collector);
-    collector.found
-}
-
-struct Collector {
-    path: Vec<String>,
-    found: BTreeMap<String, (Vec<usize>, Vec<f32>)>,
-}
-
-impl ModuleVisitor for Collector {
-    fn enter_module(&mut self, name: &str, _container_type: &str) {
-        self.path.push(name.to_string());
-    }
-
-    fn exit_module(&mut self, _name: &str, _container_type: &str) {
-        self.path.pop();
-    }
-
-    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let tensor = param.val();
-        let values = tensor.try_to_vec_as::<f32>().unwrap_or_default();
-        self.found.insert(self.path.join("."), (tensor.dims().to_vec(), values));
-    }
-}
-
-/// Replaces every parameter of `module` by the one of the same path in `values`.
-///
-/// # Errors
-/// The path and what is wrong with it, for the first parameter that is missing, has another shape,
-/// or is left over.
-pub fn with_parameters<M: Module>(
-    module: M,
-    values: BTreeMap<String, (Vec<usize>, Vec<f32>)>,
-) -> Result<M, (String, String)> {
-    let mut applier = Applier { path: Vec::new(), values, failed: None };
-    let module = module.map(&mut applier);
-    if let Some(failed) = applier.failed {
-        return Err(failed);
-    }
-    match applier.values.into_keys().next() {
-        Some(name) => Err((name, "the network has no such parameter".to_string())),
-        None => Ok(module),
-    }
-}
-
-struct Applier {
-    path: Vec<String>,
-    values: BTreeMap<String, (Vec<usize>, Vec<f32>)>,
-    failed: Option<(String, String)>,
-}
-
-impl ModuleMapper for Applier {
-    fn enter_module(&mut self, name: &str, _container_type: &str) {
-        self.path.push(name.to_string());
-    }
-
-    fn exit_module(&mut self, _name: &str, _container_type: &str) {
-        self.path.pop();
-    }
-
-    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let name = self.path.join(".");
-        let (id, tensor, mapper) = param.consume();
-        let wanted = tensor.dims();
-        let tensor = match self.values.remove(&name) {
-            Some((shape, values)) if shape == wanted => {
-                Tensor::from_data(TensorData::new(values, wanted), (&tensor.device(), tensor.dtype()))
-            }
-            found => {
-                let why = match found {
-                    Some((shape, _)) => format!("the file has shape {shape:?}, the network {wanted:?}"),
-                    None => "missing from the file".to_string(),
-                };
-                self.failed.get_or_insert((name, why));
-                tensor
-            }
-        };
-        Param::from_mapped_value(id, tensor, mapper)
+impl<C: NetworkConfig> LoadedModel<C> {
+    /// Numbers that were learned.
+    pub fn parameter_count(&self) -> usize {
+        self.model.num_params()
     }
 }
 
 /// Serialises a network in half precision, with its sizes and `notes` in the header.
 ///
 /// # Errors
-/// [`WeightsError::Format`] or [`WeightsError::Header`] if the header cannot be written.
+/// [`WeightsError::NotFinite`] for a parameter that is not finite, or does not fit half precision, [`WeightsError::Copy`]
+/// where the device does not give it, [`WeightsError::Format`] or [`WeightsError::Header`] if the header cannot be written.
 pub fn to_safetensors<C: NetworkConfig>(
     model: &C::Network,
     config: &C,
@@ -180,12 +56,16 @@ pub fn to_safetensors<C: NetworkConfig>(
     notes: &BTreeMap<String, String>,
 ) -> Result<Vec<u8>, WeightsError> {
     let origin = || format!("weights of {name}");
-    let tensors: Vec<(String, Vec<usize>, Vec<u8>)> = parameters(model)
-        .into_iter()
-        .map(|(path, (shape, values))| {
-            (path, shape, values.iter().flat_map(|&v| f16::from_f32(v).to_le_bytes()).collect())
-        })
-        .collect();
+    let parameters = parameters(model).map_err(|source| WeightsError::Copy { origin: origin(), source })?;
+    let halved = |(path, (shape, values)): (String, (Vec<usize>, Vec<f32>))| {
+        let values: Vec<f16> = values.into_iter().map(f16::from_f32).collect();
+        if values.iter().any(|v| !v.is_finite()) {
+            return Err(WeightsError::NotFinite { origin: origin(), name: path });
+        }
+        Ok((path, shape, values.into_iter().flat_map(f16::to_le_bytes).collect()))
+    };
+    let tensors: Vec<(String, Vec<usize>, Vec<u8>)> =
+        parameters.into_iter().map(halved).collect::<Result<_, _>>()?;
     let views = tensors
         .iter()
         .map(|(path, shape, bytes)| Ok((path.as_str(), TensorView::new(Dtype::F16, shape.clone(), bytes)?)))
@@ -201,6 +81,20 @@ pub fn to_safetensors<C: NetworkConfig>(
     header.insert(NAME_KEY.into(), name.into());
     safetensors::serialize(views, Some(header))
         .map_err(|source| WeightsError::Format { origin: origin(), source })
+}
+
+/// Writes a network to `path`, whole or not at all, as [`to_safetensors`] has it.
+///
+/// # Errors
+/// As [`to_safetensors`], and [`WeightsError::Io`]; the old file, if any, is then unharmed.
+pub fn save<C: NetworkConfig>(
+    path: &Path,
+    model: &C::Network,
+    config: &C,
+    name: &str,
+    notes: &BTreeMap<String, String>,
+) -> Result<(), WeightsError> {
+    write_atomically(path, &to_safetensors(model, config, name, notes)?)
 }
 
 /// Reads an SRRF network from the bytes of a safetensors file; `origin` names them in errors.
@@ -237,7 +131,7 @@ pub fn parse<C: NetworkConfig>(
 
     let mut values = BTreeMap::new();
     for (name, view) in SafeTensors::deserialize(bytes).map_err(format)?.tensors() {
-        let data = match view.dtype() {
+        let data: Vec<f32> = match view.dtype() {
             Dtype::F16 => {
                 view.data().chunks_exact(2).map(|b| f16::from_le_bytes([b[0], b[1]]).to_f32()).collect()
             }
@@ -249,6 +143,9 @@ pub fn parse<C: NetworkConfig>(
                 return Err(WeightsError::Parameter { origin, name, why });
             }
         };
+        if data.iter().any(|v| !v.is_finite()) {
+            return Err(WeightsError::NotFinite { origin, name });
+        }
         values.insert(name, (view.shape().to_vec(), data));
     }
     let model = with_parameters(config.init(device), values)
