@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 /// Crates whose code a method's answer may depend on, beside this one.
-const CRATES: [&str; 4] = ["srrf-cloud", "srrf-model", "srrf-refine", "srrf-baselines"];
+const CRATES: [&str; 6] =
+    ["srrf-cloud", "srrf-model", "srrf-refine", "srrf-classical", "srrf-baselines", "srrf"];
 
 fn main() -> io::Result<()> {
     let crates = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default()).join("..");

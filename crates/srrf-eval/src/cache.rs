@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     fn method(settings: &str) -> Method {
-        Method { settings: settings.into(), ..crate::methods::plain(Identity) }
+        Method { settings: settings.into(), ..Method::new(Identity) }
     }
 
     fn pair(item: u64) -> Pair {

@@ -13,8 +13,8 @@ use srrf_corrupt::{CorruptionKind, PairConfig, RotationRange, Severity};
 
 use crate::EvalError;
 use crate::TablesOptions;
-use crate::methods::METHODS;
-use crate::synthesized::{CLEAN, Protocol};
+use crate::methods::registry;
+use crate::protocol::{CLEAN, Protocol};
 
 /// Shapes scored when `--shapes` is not given.
 const DEFAULT_SHAPES: usize = 20;
@@ -149,6 +149,11 @@ pub struct Options {
     #[arg(long, value_name = "WHICH", value_parser = ["both", "source", "target"], default_value = "both")]
     pub corrupt: String,
 
+    /// Keep this share of each cloud, after the corruption: the points farthest along a random direction, another one for each
+    /// cloud; 0.7 is RPMNet's partial overlap [default: all of both]
+    #[arg(long, value_name = "SHARE", value_parser = real(0.01, 1.0), allow_negative_numbers = true)]
+    pub crop: Option<f64>,
+
     /// Box normalisation after a corruption
     #[arg(long, value_name = "WHEN", value_parser = ["none", "canonical", "after_pose"], default_value = "none")]
     pub normalize: String,
@@ -204,7 +209,7 @@ pub(crate) const OF_BASELINES: &str =
 const OF_POSES: &str = "Here degrees are the largest of each Euler angle; `dcp` takes the test poses of DCP, which fix \
      the translation too";
 
-const PAIR_OPTIONS: [&str; 13] = [
+const PAIR_OPTIONS: [&str; 14] = [
     "data",
     "spread",
     "shapes",
@@ -215,6 +220,7 @@ const PAIR_OPTIONS: [&str; 13] = [
     "sampling",
     "independent",
     "corrupt",
+    "crop",
     "normalize",
     "rotation",
     "translation",
@@ -263,6 +269,7 @@ impl Options {
             shapes: self.shapes,
             seed: self.seed,
             pair: self.pair_config()?,
+            crop: self.crop,
             dcp_poses: self.rotation == "dcp",
             spread: self.spread,
         })
@@ -309,7 +316,9 @@ impl Options {
 /// Weights by method: `METHOD=PATH`, or a path alone for srrf.
 pub(crate) fn weights_by_method(weights: &[String]) -> BTreeMap<String, PathBuf> {
     let split = |text: &String| match text.split_once('=') {
-        Some((method, path)) if METHODS.iter().any(|m| m.name == method) => (method.to_owned(), path.into()),
+        Some((method, path)) if registry().iter().any(|m| m.name == method) => {
+            (method.to_owned(), path.into())
+        }
         _ => ("srrf".to_owned(), text.into()),
     };
     weights.iter().map(split).collect()
@@ -348,7 +357,7 @@ mod tests {
     fn every_switch_reaches_the_protocol() {
         let protocol = parse(
             "--corruptions cutout,gaussian,cutout --severities 5,1 --shapes 9 --seed 4 --points 200 \
-             --independent --corrupt target --normalize after_pose --rotation so3 --translation 0.25 \
+             --independent --corrupt target --crop 0.7 --normalize after_pose --rotation so3 --translation 0.25 \
              --reading modelnet40_c",
         )
         .protocol()
@@ -359,6 +368,7 @@ mod tests {
         assert_eq!((protocol.shapes, protocol.seed, protocol.pair.points), (9, 4, 200));
         assert_eq!(protocol.pair.sampling, Sampling::Independent);
         assert_eq!(protocol.pair.corrupt, Corrupt::Target);
+        assert_eq!(protocol.crop, Some(0.7));
         assert_eq!(protocol.pair.normalize, Normalize::AfterPose);
         assert_eq!(protocol.pair.rotation, RotationRange::So3);
         assert_eq!(protocol.pair.translation, 0.25);

@@ -3,10 +3,11 @@
 use std::io;
 use std::path::PathBuf;
 
+use srrf_cloud::io::ArrayError;
 use srrf_corrupt::datasets::SourceError;
 use srrf_corrupt::{SeverityOutOfRange, UnknownCorruption};
 
-use crate::arrays::ArrayError;
+use crate::methods::SetupError;
 use crate::metrics::MetricError;
 
 /// Why an evaluation cannot be done.
@@ -55,12 +56,12 @@ pub enum EvalError {
         known: String,
     },
     /// A method cannot be set up.
-    #[error("method {name}: {problem}")]
+    #[error("method {name}: {source}")]
     Setup {
         /// Its name.
-        name: String,
+        name: &'static str,
         /// What is wrong, and the way out.
-        problem: String,
+        source: SetupError,
     },
     /// Options that cannot be used, or not together.
     #[error("{0}")]

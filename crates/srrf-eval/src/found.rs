@@ -2,7 +2,7 @@
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use srrf_cloud::{RegisterError, Registration, Rigid};
+use srrf_cloud::{Certainty, RegisterError, Registration, Rigid};
 
 use crate::chamfer::SkeletonAgreement;
 
@@ -35,6 +35,9 @@ pub(crate) struct Poses {
     /// How well the skeletons agree under the true pose: Chamfer, sum of distances, spread.
     #[serde(rename = "k", default, skip_serializing_if = "Option::is_none")]
     pub skeletons: Option<[Exact; 3]>,
+    /// How sure the method is: the probability, and whether it abstains.
+    #[serde(rename = "q", default, skip_serializing_if = "Option::is_none")]
+    pub certainty: Option<(Exact, bool)>,
 }
 
 /// The pose of a branch.
@@ -64,6 +67,7 @@ impl Found {
                 .skeletons
                 .and_then(|s| SkeletonAgreement::new(&s.source.points, &s.target.points, truth).ok())
                 .map(|a| [a.chamfer, a.chamfer_sum, a.spread].map(Exact)),
+            certainty: found.certainty.map(|c| (Exact(c.probability), c.abstain)),
         };
         Self { seconds: Exact(seconds), answer: answer.map(poses).map_err(|e| e.to_string()) }
     }
@@ -77,6 +81,11 @@ impl Poses {
             chamfer_sum: chamfer_sum.0,
             spread: spread.0,
         })
+    }
+
+    /// How sure the method is; `None` from methods that do not say.
+    pub fn certainty(&self) -> Option<Certainty> {
+        self.certainty.map(|(probability, abstain)| Certainty { probability: probability.0, abstain })
     }
 }
 
@@ -141,6 +150,7 @@ mod tests {
             }),
             iterations: 7,
             converged: false,
+            certainty: Some(Certainty { probability: 1.0 / 3.0, abstain: true }),
             ..Registration::from_pose(pose)
         };
         let answers = [Ok(found), Err(RegisterError::NoPose("a \"reason\"\nof two lines".into()))];
@@ -151,5 +161,14 @@ mod tests {
             assert_eq!(serde_json::from_str::<Found>(&text).unwrap(), kept);
             assert!(kept.answer.is_err() || kept.answer.as_ref().unwrap().agreement().unwrap().spread > 0.0);
         }
+    }
+
+    #[test]
+    fn answers_that_were_kept_before_methods_were_sure_can_be_read() {
+        let one = r#""1e0","0e0","0e0","0e0","1e0","0e0","0e0","0e0","1e0","0e0","0e0","0e0""#;
+        let line = format!(r#"{{"s":"5e-1","Ok":{{"p":[{one}],"i":3,"c":true}}}}"#);
+        let kept: Found = serde_json::from_str(&line).unwrap();
+        let poses = kept.answer.unwrap();
+        assert_eq!((poses.pose, poses.iterations, poses.certainty()), (Rigid::identity(), 3, None));
     }
 }

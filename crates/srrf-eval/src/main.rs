@@ -1,6 +1,5 @@
 //! `srrf-eval`: scores registration methods on clean and corrupted pairs.
 
-use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -10,8 +9,8 @@ use srrf_args::{interrupt, run_program};
 use srrf_cloud::profile;
 use srrf_eval::tables::{self, Progress};
 use srrf_eval::{
-    Command, EvalError, Meta, MethodContext, Options, PairFile, PairSource, Run, Summary, SynthesizedPairs,
-    TablesOptions, Transforms, data, report,
+    Command, DefaultRows, EvalError, Meta, MethodContext, MethodSet, Options, PairFile, PairSource, Run,
+    Summary, SynthesizedPairs, TablesOptions, Transforms, data, report,
 };
 
 fn main() -> ExitCode {
@@ -35,7 +34,8 @@ fn run(options: &Options) -> Result<(), EvalError> {
     if options.profile {
         profile::start();
     }
-    let mut selection = srrf_eval::select(&options.methods)?;
+    let context = MethodContext { weights: options.weights_by_method(), device: options.device.clone() };
+    let mut set = MethodSet::new(&options.methods, DefaultRows::Plain, &context)?.without_held();
     report::prepare(&options.out)?;
     let pairs = open_pairs(options)?;
     say(&format!("data: {}", pairs.description()));
@@ -48,16 +48,14 @@ fn run(options: &Options) -> Result<(), EvalError> {
         .iter()
         .map(|path| Transforms::read(path, pairs.groups()))
         .collect::<Result<Vec<_>, _>>()?;
-    selection.add_transforms(&transforms)?;
+    set.add_transforms(&transforms)?;
     if !pairs.has_oracle() {
-        selection.drop_oracle(&options.methods)?;
+        set.drop_oracle(!options.methods.is_empty())?;
     }
-    let context = MethodContext { weights: options.weights_by_method(), device: options.device.clone() };
-    let methods = selection.set_up(&context)?;
-    let weights: BTreeMap<String, String> = methods
-        .iter()
-        .filter_map(|(_, m)| Some((m.register.name().to_owned(), m.weights.clone()?)))
-        .collect();
+    if set.rows.is_empty() {
+        return Err(EvalError::Usage("no method is left to score".into()));
+    }
+    let weights = set.weights();
     if weights.is_empty() {
         say("weights: none are needed, since no method that learns is run");
     }
@@ -72,9 +70,9 @@ fn run(options: &Options) -> Result<(), EvalError> {
     let bar = progress(pairs.as_ref(), "starting");
     let run = Run {
         pairs: pairs.as_ref(),
-        methods: &methods,
+        methods: &set.methods,
         transforms,
-        rows: selection.rows,
+        rows: set.rows.clone(),
         threads,
         cache: None,
     };

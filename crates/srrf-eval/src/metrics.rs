@@ -62,6 +62,9 @@ pub struct PairError {
     pub translation_norm: f64,
     /// Modified Chamfer distance of RPMNet, squared unit of the clouds, where the clean shape is known.
     pub chamfer: Option<f64>,
+    /// Whether the pose is right ([`is_right`]), where that was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub right: Option<bool>,
     /// Whether the method gave no usable pose; the identity stands in for it.
     pub failed: bool,
 }
@@ -81,6 +84,7 @@ impl PairError {
             rotation_deg: pose.angle_to_deg(truth),
             translation_norm: translation.norm(),
             chamfer: None,
+            right: None,
             failed: usable.is_none(),
         }
     }
@@ -129,6 +133,9 @@ pub struct Scores {
     pub recall: f64,
     /// Mean modified Chamfer distance, over the pairs that have one.
     pub chamfer: Option<f64>,
+    /// Share of right poses ([`is_right`]) in [0, 1], over the pairs where that was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub right: Option<f64>,
     /// Number of pairs.
     pub pairs: usize,
     /// Pairs on which the method gave no usable pose.
@@ -157,6 +164,7 @@ impl Scores {
         let rotations: Vec<f64> = errors.iter().map(|e| e.rotation_deg).collect();
         let translations: Vec<f64> = errors.iter().map(|e| e.translation_norm).collect();
         let chamfers: Vec<f64> = errors.iter().filter_map(|e| e.chamfer).collect();
+        let right: Vec<f64> = errors.iter().filter_map(|e| Some(f64::from(u8::from(e.right?)))).collect();
         Ok(Self {
             mse_r,
             rmse_r,
@@ -170,6 +178,7 @@ impl Scores {
             median_trans: median(translations),
             recall: errors.iter().filter(|e| e.recalled()).count() as f64 / errors.len() as f64,
             chamfer: (!chamfers.is_empty()).then(|| mean(&chamfers)),
+            right: (!right.is_empty()).then(|| mean(&right)),
             pairs: errors.len(),
             failed: errors.iter().filter(|e| e.failed).count(),
         })
@@ -184,6 +193,7 @@ impl Scores {
         }
         let average = |value: fn(&Self) -> f64| mean(&scores.iter().map(value).collect::<Vec<_>>());
         let chamfers: Vec<f64> = scores.iter().filter_map(|s| s.chamfer).collect();
+        let right: Vec<f64> = scores.iter().filter_map(|s| s.right).collect();
         Some(Self {
             mse_r: average(|s| s.mse_r),
             rmse_r: average(|s| s.rmse_r),
@@ -197,6 +207,7 @@ impl Scores {
             median_trans: average(|s| s.median_trans),
             recall: average(|s| s.recall),
             chamfer: (chamfers.len() == scores.len()).then(|| mean(&chamfers)),
+            right: (right.len() == scores.len()).then(|| mean(&right)),
             pairs: scores.iter().map(|s| s.pairs).sum(),
             failed: scores.iter().map(|s| s.failed).sum(),
         })

@@ -19,13 +19,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Vector3};
-use srrf_cloud::io::write_atomically;
+use srrf_cloud::io::{Array, ArrayError, NpzArrays, NpzWriter, read_npz, write_atomically};
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::Pair;
 
 use crate::EvalError;
-use crate::arrays::{self, Array, ArrayError, Npz};
-use crate::npz_writer::NpzWriter;
 use crate::pairs::{EvalPair, Group, PairSource};
 
 /// Largest deviation of `R^T R` from the identity, per entry, in a true rotation: well above
@@ -57,7 +55,7 @@ impl PairFile {
     /// # Errors
     /// [`ArrayError`] which names the file, the array, what is wrong and what is expected.
     pub fn read(path: &Path) -> Result<Self, ArrayError> {
-        let Npz { names: have, mut arrays } = arrays::read_npz(path)?;
+        let NpzArrays { names: have, mut arrays } = read_npz(path)?;
         let mut names: Vec<&str> = Vec::new();
         for array in &have {
             let group = ["_x", "_y", "_R", "_t"].iter().find_map(|end| array.strip_suffix(end));

@@ -21,7 +21,7 @@ pub(crate) struct Quantity {
 }
 
 /// All quantities, in the order of the report.
-pub(crate) const QUANTITIES: [Quantity; 8] = [
+pub(crate) const QUANTITIES: [Quantity; 9] = [
     Quantity {
         key: "rmse_r",
         title: "Rotation RMSE, degrees",
@@ -94,19 +94,20 @@ pub(crate) const QUANTITIES: [Quantity; 8] = [
         more_is_better: false,
         principal: false,
     },
+    Quantity {
+        key: "right",
+        title: "Right, percent (5 degrees, and a tenth of the target's radius where the source lands)",
+        value: |s| s.right,
+        scale: 100.0,
+        digits: 1,
+        more_is_better: true,
+        principal: false,
+    },
 ];
 
 impl Quantity {
     /// The number that is shown, if there is one: the value times the scale.
     pub fn shown(&self, scores: &Scores) -> Option<f64> {
         (self.value)(scores).map(|value| value * self.scale)
-    }
-
-    /// The number as printed; `-` where there is none.
-    pub fn format(&self, scores: Option<&Scores>) -> String {
-        match scores.and_then(|scores| self.shown(scores)) {
-            Some(number) => format!("{number:.*}", self.digits),
-            None => "-".into(),
-        }
     }
 }

@@ -3,16 +3,19 @@
 use std::time::Instant;
 
 use rayon::prelude::*;
-use srrf_cloud::{Rigid, profile};
+use srrf_cloud::{Certainty, Rigid, profile};
 use srrf_corrupt::oracle_pose;
 
 use crate::EvalError;
 use crate::cache::{Cache, PairHash};
+use crate::certainty::Claim;
 use crate::chamfer::{CleanShape, SkeletonAgreement};
-use crate::found::{Found, Poses};
-use crate::methods::{METHODS, Method, ORACLE};
-use crate::metrics::{PairError, is_finite};
+use crate::found::Found;
+use crate::method_set::{MethodSet, source_of};
+use crate::methods::Method;
+use crate::metrics::{PairError, is_finite, is_right};
 use crate::pairs::{EvalPair, Group, PairSource};
+use crate::rows::{Row, RowSource};
 use crate::transforms::Transforms;
 
 /// Pairs of each thread between two reports of progress.
@@ -22,13 +25,12 @@ const CHUNK: usize = 8;
 pub struct Run<'a> {
     /// The pairs.
     pub pairs: &'a dyn PairSource,
-    /// The methods, set up, each with the names of the rows that it may fill. Those that fill none of
-    /// [`Run::rows`] are not run.
-    pub methods: &'a [(&'static [&'static str], Method)],
+    /// The methods, set up. Those that fill none of [`Run::rows`] are not run.
+    pub methods: &'a [Method],
     /// Answers of other tools, a row each.
     pub transforms: Vec<Transforms>,
-    /// Names of the rows to keep, in the order of the tables.
-    pub rows: Vec<String>,
+    /// The rows to keep, in the order of the tables.
+    pub rows: Vec<Row>,
     /// Worker threads, at least 1.
     pub threads: usize,
     /// Answers that were computed before, and where new ones are kept.
@@ -53,6 +55,8 @@ pub struct Answer {
     /// How well the skeletons agree under the true pose; only in the row of a method that makes
     /// skeletons, not in those of its branches.
     pub skeletons: Option<SkeletonAgreement>,
+    /// How sure the method is of its pose, from methods that say so.
+    pub certainty: Option<Certainty>,
 }
 
 /// A pair with the answers of all rows.
@@ -79,10 +83,19 @@ pub struct PairRecord {
 pub struct Outcome {
     /// The groups.
     pub groups: Vec<Group>,
-    /// Names of the rows, in the order of the tables.
-    pub rows: Vec<String>,
+    /// The rows, in the order of the tables.
+    pub rows: Vec<Row>,
     /// The pairs, group after group.
     pub records: Vec<PairRecord>,
+}
+
+impl<'a> Run<'a> {
+    /// All methods and rows of a set on pairs, on all cores, without files of transforms and without a cache.
+    pub fn new(pairs: &'a dyn PairSource, set: &'a MethodSet) -> Self {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let (methods, rows) = (&set.methods[..], set.rows.clone());
+        Self { pairs, methods, transforms: Vec::new(), rows, threads, cache: None }
+    }
 }
 
 impl Run<'_> {
@@ -92,7 +105,7 @@ impl Run<'_> {
     /// Answers do not depend on `threads`.
     ///
     /// # Errors
-    /// [`EvalError`] where a pair cannot be made, or an answer not be kept. A method that fails is no
+    /// [`EvalError`] where nothing fills a row, a pair cannot be made, or an answer not be kept. A method that fails is no
     /// error: its failures are counted.
     pub fn execute(&self, after_chunk: &mut (dyn FnMut(usize, &str) + Send)) -> Result<Outcome, EvalError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build()?;
@@ -101,7 +114,10 @@ impl Run<'_> {
 
     fn execute_here(&self, after_chunk: &mut (dyn FnMut(usize, &str) + Send)) -> Result<Outcome, EvalError> {
         let groups = self.pairs.groups();
-        let methods = self.running();
+        let sources = self.sources()?;
+        let runs = |number: usize| {
+            sources.iter().any(|s| matches!(s, RowSource::Answer { method, .. } if *method == number))
+        };
         let work: Vec<(usize, usize)> = groups
             .iter()
             .enumerate()
@@ -116,15 +132,23 @@ impl Run<'_> {
             let hash = |pair: &EvalPair| Cache::pair_hash(&pair.pair);
             let hashes: Vec<PairHash> =
                 self.cache.map_or(Vec::new(), |_| pairs.par_iter().map(hash).collect());
-            let answers: Vec<Vec<Found>> = methods
+            // As many as there are methods; empty for those that fill no row.
+            let answers: Vec<Vec<Found>> = self
+                .methods
                 .iter()
-                .map(|(_, method)| self.answers(method, &pairs, &hashes))
+                .enumerate()
+                .map(
+                    |(number, m)| {
+                        if runs(number) { self.answers(m, &pairs, &hashes) } else { Ok(Vec::new()) }
+                    },
+                )
                 .collect::<Result<_, _>>()?;
             let scored: Vec<PairRecord> = (0..chunk.len())
                 .into_par_iter()
                 .map(|i| {
-                    let found: Vec<&Found> = answers.iter().map(|of_method| &of_method[i]).collect();
-                    self.record(chunk[i], &pairs[i], &found)
+                    let found: Vec<Option<&Found>> =
+                        answers.iter().map(|of_method| of_method.get(i)).collect();
+                    self.record(chunk[i], &pairs[i], &sources, &found)
                 })
                 .collect();
             records.extend(scored);
@@ -134,10 +158,11 @@ impl Run<'_> {
         Ok(Outcome { groups: groups.to_vec(), rows: self.rows.clone(), records })
     }
 
-    /// The methods that fill a row.
-    fn running(&self) -> Vec<&(&'static [&'static str], Method)> {
-        let fills = |rows: &[&str]| rows.iter().any(|row| self.rows.iter().any(|wanted| wanted == row));
-        self.methods.iter().filter(|(rows, _)| fills(rows)).collect()
+    /// What fills each row.
+    fn sources(&self) -> Result<Vec<RowSource>, EvalError> {
+        let source = |row: &Row| source_of(row, self.methods, &self.transforms);
+        let missing = |row: &Row| EvalError::Usage(format!("no method of this run fills the row {row}"));
+        self.rows.iter().map(|row| source(row).ok_or_else(|| missing(row))).collect()
     }
 
     /// One method on the pairs of a chunk; only those that the cache lacks are computed.
@@ -168,12 +193,11 @@ impl Run<'_> {
 
     /// One method on pairs, side by side.
     fn register(&self, method: &Method, pairs: &[&EvalPair]) -> Vec<Found> {
-        let known = METHODS.iter().find(|entry| entry.name == method.register.name());
-        let name = known.map_or("another method", |entry| entry.name);
         let call = |pair: &&EvalPair| {
             let pair = &pair.pair;
             let start = Instant::now();
-            let answer = profile::stage(name, || method.register.register(&pair.source, &pair.target));
+            let answer =
+                profile::stage(method.stage, || method.register.register(&pair.source, &pair.target));
             Found::new(answer, &pair.target_from_source, start.elapsed().as_secs_f64())
         };
         // One part for each thread, so that none takes up another pair while the first is being timed.
@@ -182,15 +206,21 @@ impl Run<'_> {
     }
 
     /// Scores all rows on one pair.
-    fn record(&self, (group, item): (usize, usize), pair: &EvalPair, found: &[&Found]) -> PairRecord {
+    fn record(
+        &self,
+        (group, item): (usize, usize),
+        pair: &EvalPair,
+        sources: &[RowSource],
+        found: &[Option<&Found>],
+    ) -> PairRecord {
         let clean = pair.clean.as_ref().and_then(|points| CleanShape::new(points).ok());
-        let answers = self.rows.iter().map(|row| {
-            let mut answer = self.answer(row, group, item, pair, found);
+        let (source, target, truth) = (&pair.pair.source, &pair.pair.target, &pair.pair.target_from_source);
+        let answers = sources.iter().map(|row| {
+            let mut answer = self.answer(*row, (group, item), pair, found);
             let pose = answer.pose.unwrap_or_else(Rigid::identity);
-            let truth = &pair.pair.target_from_source;
-            answer.error.chamfer = clean
-                .as_ref()
-                .map(|shape| shape.modified_chamfer(&pair.pair.source, &pair.pair.target, &pose, truth));
+            answer.error.chamfer =
+                clean.as_ref().map(|shape| shape.modified_chamfer(source, target, &pose, truth));
+            answer.error.right = Some(answer.pose.is_some_and(|pose| is_right(&pose, truth, source, target)));
             answer
         });
         PairRecord {
@@ -199,37 +229,47 @@ impl Run<'_> {
             id: pair.pair.id.clone(),
             class: pair.pair.class.clone(),
             symmetric: pair.pair.symmetric,
-            truth: pair.pair.target_from_source,
+            truth: *truth,
             answers: answers.collect(),
         }
     }
 
-    /// The answer of the row of this name: a method, one of its branches, the oracle, or a file.
-    fn answer(&self, row: &str, group: usize, item: usize, pair: &EvalPair, found: &[&Found]) -> Answer {
+    /// The answer of a row: of a method, one of its branches, the oracle, or a file.
+    fn answer(
+        &self,
+        row: RowSource,
+        (group, item): (usize, usize),
+        pair: &EvalPair,
+        found: &[Option<&Found>],
+    ) -> Answer {
         let truth = &pair.pair.target_from_source;
-        if row == ORACLE {
-            let pose = oracle_pose(&pair.pair);
-            let failure = pose.is_none().then(|| "the correspondences determine no pose".to_owned());
-            return Answer::new(pose, failure, truth);
-        }
-        if let Some(file) = self.transforms.iter().find(|t| t.name == row) {
-            let pose = file.poses[group][item];
-            return Answer::new(pose, pose.is_none().then(|| "the file holds no pose".to_owned()), truth);
-        }
-        let running = self.running();
-        let filled = running.iter().zip(found).find(|((rows, _), _)| rows.contains(&row));
-        let held = || running.iter().zip(found).find(|((_, method), _)| method.branch_of(row).is_some());
-        let Some(((_, method), found)) = filled.or_else(held) else {
-            return Answer::new(None, Some(format!("no method fills the row {row}")), truth);
+        let (method, branch, own) = match row {
+            RowSource::Oracle => {
+                let pose = oracle_pose(&pair.pair);
+                let failure = pose.is_none().then(|| "the correspondences determine no pose".to_owned());
+                return Answer::new(pose, failure, truth);
+            }
+            RowSource::File(number) => {
+                let pose = self.transforms[number].poses[group][item];
+                let failure = pose.is_none().then(|| "the file holds no pose".to_owned());
+                return Answer::new(pose, failure, truth);
+            }
+            RowSource::Answer { method, branch, own } => (method, branch, own),
+        };
+        let Some(found) = found[method] else {
+            return Answer::new(None, Some("the method did not run".to_owned()), truth);
         };
         // What a method that goes on took, and how it ended, is not the row's.
-        let own = method.branch_of(row).is_none();
         let seconds = own.then_some(found.seconds.0);
         let poses = match &found.answer {
             Ok(poses) => poses,
             Err(failure) => return Answer { seconds, ..Answer::new(None, Some(failure.clone()), truth) },
         };
-        let (pose, failure) = match pose_of_row(poses, method, row) {
+        let pose = match branch {
+            None => Some(poses.pose),
+            Some(branch) => poses.branches.iter().find(|b| b.name == branch).map(|b| b.pose),
+        };
+        let (pose, failure) = match pose {
             Some(pose) if is_finite(&pose) => (Some(pose), None),
             Some(_) => (None, Some("the pose is not finite".to_owned())),
             None => (None, Some("the method gave no pose for this branch".to_owned())),
@@ -238,40 +278,50 @@ impl Run<'_> {
             seconds,
             iterations: own.then_some(poses.iterations),
             converged: own.then_some(poses.converged),
-            skeletons: poses.agreement().filter(|_| row == method.register.name()),
+            skeletons: poses.agreement().filter(|_| branch.is_none()),
+            certainty: poses.certainty().filter(|_| branch.is_none()),
             ..Answer::new(pose, failure, truth)
         }
     }
 }
 
-/// The pose of the row `<method>`, or of the branch in the row `<method>-<branch>`.
-fn pose_of_row(found: &Poses, method: &Method, row: &str) -> Option<Rigid> {
-    let name = method.register.name();
-    if row == name {
-        return Some(found.pose);
-    }
-    let branch = match method.branch_of(row) {
-        Some(branch) => branch,
-        None => row.strip_prefix(name)?.strip_prefix('-')?,
-    };
-    found.branches.iter().find(|b| b.name == branch).map(|b| b.pose)
-}
-
 impl Answer {
     fn new(pose: Option<Rigid>, failure: Option<String>, truth: &Rigid) -> Self {
         let error = PairError::new(pose.as_ref(), truth);
-        Self { error, pose, failure, iterations: None, converged: None, seconds: None, skeletons: None }
+        Self {
+            error,
+            pose,
+            failure,
+            iterations: None,
+            converged: None,
+            seconds: None,
+            skeletons: None,
+            certainty: None,
+        }
+    }
+
+    /// What the method says of its pose, and whether it is right; `None` from an answer without a certainty. No pose is a
+    /// claim too.
+    pub(crate) fn claim(&self) -> Option<Claim> {
+        let right = self.error.right.unwrap_or(false);
+        match self.certainty {
+            Some(c) if self.pose.is_some() => {
+                Some(Claim { probability: c.probability, abstain: c.abstain, right })
+            }
+            _ if self.pose.is_none() => Some(Claim::NO_POSE),
+            _ => None,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::{Branch, Register, RegisterError, Registration, Skeleton, Skeletons, Solid};
+    use srrf_cloud::{Branch, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, Solid};
     use srrf_corrupt::{CorruptionKind, PairConfig, Severity};
 
     use super::*;
     use crate::data;
-    use crate::synthesized::{Protocol, SynthesizedPairs};
+    use crate::protocol::{Protocol, SynthesizedPairs};
 
     /// Answers the identity with two branches; fails on clouds whose first source coordinate is
     /// positive.
@@ -293,11 +343,10 @@ mod tests {
             // Skeletons that agree under no pose but the identity.
             let skeleton = Skeleton { points: vec![[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]], radii: Vec::new() };
             let skeletons = Some(Skeletons { source: skeleton.clone(), target: skeleton });
-            Ok(Registration { branches, skeletons, ..Registration::from_pose(Rigid::identity()) })
+            let certainty = Some(Certainty { probability: 0.75, abstain: false });
+            Ok(Registration { branches, skeletons, certainty, ..Registration::from_pose(Rigid::identity()) })
         }
     }
-
-    const ROWS: &[&str] = &["moody-left", "moody-right", "moody"];
 
     fn pairs() -> SynthesizedPairs {
         let protocol = Protocol {
@@ -308,6 +357,7 @@ mod tests {
             shapes: 11,
             seed: 3,
             pair: PairConfig { points: 129, ..PairConfig::default() },
+            crop: None,
             dcp_poses: false,
             spread: false,
         };
@@ -319,10 +369,10 @@ mod tests {
     }
 
     fn cached(pairs: &SynthesizedPairs, threads: usize, cache: Option<&Cache>) -> Outcome {
-        let moody = crate::methods::plain(Moody);
-        let icp = crate::methods::METHODS.iter().find(|m| m.name == "icp").unwrap();
-        let methods = vec![(ROWS, moody), (icp.rows, (icp.build)(&Default::default()).unwrap())];
-        let rows = ["icp", ORACLE, "moody-left", "moody-right", "moody"].map(str::to_owned).to_vec();
+        let moody = Method { branches: &["left", "right"], ..Method::new(Moody) };
+        let icp = Method::new(srrf_classical::Icp::default());
+        let methods = [moody, icp];
+        let rows = [&[Row::ICP, Row::Oracle][..], &methods[0].rows()].concat();
         let run = Run { pairs, methods: &methods, transforms: vec![], rows, threads, cache };
         let mut done = 0;
         let outcome = run.execute(&mut |pairs, _| done += pairs).unwrap();
@@ -366,10 +416,13 @@ mod tests {
             assert_eq!(left.pose, moody.pose);
             if moody.error.failed {
                 assert!(moody.failure.as_ref().unwrap().contains("not today"));
+                assert_eq!(moody.claim(), Some(Claim::NO_POSE));
                 failed += 1;
             } else {
                 assert!(right.failure.as_ref().unwrap().contains("not finite"));
                 assert!(moody.skeletons.unwrap().chamfer > 1e-3 && left.skeletons.is_none());
+                assert_eq!(moody.claim().unwrap().probability, 0.75);
+                assert!(left.certainty.is_none() && oracle.claim().is_none());
                 answered += 1;
             }
             assert!(!oracle.error.failed);
@@ -379,5 +432,13 @@ mod tests {
             }
         }
         assert!(failed > 0 && answered > 0);
+    }
+
+    #[test]
+    fn a_row_that_nothing_fills_is_an_error() {
+        let pairs = pairs();
+        let rows = vec![Row::DCP];
+        let run = Run { pairs: &pairs, methods: &[], transforms: vec![], rows, threads: 1, cache: None };
+        assert!(run.execute(&mut |_, _| {}).unwrap_err().to_string().contains("dcp"));
     }
 }

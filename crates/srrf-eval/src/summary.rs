@@ -3,10 +3,12 @@
 use serde::{Serialize, Serializer};
 
 use crate::EvalError;
+use crate::certainty::{CertaintyScores, Claim};
 use crate::chamfer::SkeletonAgreement;
 use crate::metrics::{PairError, Scores};
+use crate::protocol::CLEAN;
+use crate::rows::Row;
 use crate::run::Outcome;
-use crate::synthesized::CLEAN;
 
 /// Which severities a row of the summary covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,8 +44,8 @@ pub struct SummaryRow {
     pub corruption: String,
     /// A number, or `mean`: the mean of the values of the severities.
     pub severity: SeverityKey,
-    /// The method.
-    pub method: String,
+    /// The row of the tables.
+    pub method: Row,
     /// Scores over all pairs.
     #[serde(flatten)]
     pub scores: Scores,
@@ -53,6 +55,9 @@ pub struct SummaryRow {
     pub no_symmetric: Option<Scores>,
     /// How well the skeletons agree; `None` for methods without skeletons.
     pub skeletons: Option<SkeletonAgreement>,
+    /// How well the method knows whether it is right, over all pairs of these severities; `None` for methods that do not say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certainty: Option<CertaintyScores>,
 }
 
 /// All rows: corruption by corruption; in each the severities, then their mean; in each the methods
@@ -95,8 +100,8 @@ impl Summary {
     }
 
     /// The row of these keys.
-    pub fn get(&self, corruption: &str, severity: SeverityKey, method: &str) -> Option<&SummaryRow> {
-        self.rows.iter().find(|r| r.corruption == corruption && r.severity == severity && r.method == method)
+    pub fn get(&self, corruption: &str, severity: SeverityKey, method: &Row) -> Option<&SummaryRow> {
+        self.rows.iter().find(|r| r.corruption == corruption && r.severity == severity && r.method == *method)
     }
 
     /// The corruptions or groups, in order.
@@ -105,15 +110,21 @@ impl Summary {
     }
 
     /// The methods, in order.
-    pub fn methods(&self) -> Vec<&str> {
-        distinct(self.rows.iter().map(|r| r.method.as_str()))
+    pub fn methods(&self) -> Vec<&Row> {
+        distinct(self.rows.iter().map(|r| &r.method))
+    }
+
+    /// How well a method knows whether it is right, over all pairs; `None` for methods that do not say.
+    pub fn certainty(&self, method: &Row) -> Option<CertaintyScores> {
+        let means = self.rows.iter().filter(|r| r.method == *method && r.severity == SeverityKey::Mean);
+        CertaintyScores::together(means.filter_map(|r| r.certainty.as_ref()))
     }
 
     /// The mean of a value over the corruptions, clean pairs aside; `None` where one lacks it, and where
     /// there are fewer than two.
     pub(crate) fn over_corruptions(
         &self,
-        method: &str,
+        method: &Row,
         value: impl Fn(&SummaryRow) -> Option<f64>,
     ) -> Option<f64> {
         let corruptions = self.corruptions().into_iter().filter(|c| *c != CLEAN);
@@ -138,7 +149,7 @@ impl Summary {
     }
 }
 
-fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+fn distinct<'a, T: PartialEq + ?Sized>(names: impl Iterator<Item = &'a T>) -> Vec<&'a T> {
     let mut seen = Vec::new();
     names.for_each(|name| {
         if !seen.contains(&name) {
@@ -156,10 +167,14 @@ fn row(outcome: &Outcome, group: usize, method: usize) -> Result<SummaryRow, Eva
         of_group().filter(|r| !r.symmetric).map(|r| r.answers[method].error).collect();
     let seconds: Vec<f64> = of_group().filter_map(|r| r.answers[method].seconds).collect();
     let skeletons: Vec<SkeletonAgreement> = of_group().filter_map(|r| r.answers[method].skeletons).collect();
+    // A method that is sure of one pose in the whole run is one that says so; what it does not answer counts.
+    let says = outcome.records.iter().any(|r| r.answers[method].certainty.is_some());
+    let claims: Vec<Claim> =
+        of_group().filter(|_| says).map(|r| r.answers[method].claim().unwrap_or(Claim::NO_POSE)).collect();
     let scores = |errors: &[PairError]| {
         Scores::from_errors(errors).map_err(|source| EvalError::Metric {
             group: outcome.groups[group].name(),
-            method: outcome.rows[method].clone(),
+            method: outcome.rows[method].to_string(),
             source,
         })
     };
@@ -171,6 +186,7 @@ fn row(outcome: &Outcome, group: usize, method: usize) -> Result<SummaryRow, Eva
         seconds_per_pair: (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64),
         no_symmetric: (!asymmetric.is_empty()).then(|| scores(&asymmetric)).transpose()?,
         skeletons: SkeletonAgreement::mean(&skeletons),
+        certainty: CertaintyScores::of(&claims),
     })
 }
 
@@ -189,19 +205,20 @@ fn mean(rows: &[&SummaryRow]) -> Option<SummaryRow> {
         seconds_per_pair: (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64),
         no_symmetric: Scores::mean(&asymmetric),
         skeletons: SkeletonAgreement::mean(&skeletons),
+        certainty: CertaintyScores::together(rows.iter().filter_map(|r| r.certainty.as_ref())),
     })
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use srrf_cloud::{EulerXyz, Rigid};
+    use srrf_cloud::{Certainty, EulerXyz, Rigid};
 
     use super::*;
     use crate::pairs::Group;
     use crate::run::{Answer, PairRecord};
 
     /// Clean and cutout at severities 1 and 3, two pairs each, one of them symmetric. Method `a` is
-    /// off by 1 degree per severity (2 on symmetric shapes), `b` by 10 times as much.
+    /// off by 1 degree per severity (2 on symmetric shapes), `b` by 10 times as much; `b` says how sure it is.
     pub(crate) fn outcome() -> Outcome {
         let group = |corruption: &str, severity| Group { corruption: corruption.into(), severity, pairs: 2 };
         let groups = vec![group("clean", 0), group("cutout", 1), group("cutout", 3)];
@@ -213,8 +230,9 @@ pub(crate) mod tests {
                     let angle = scale * f64::from(group.severity) * if symmetric { 2.0 } else { 1.0 };
                     let rotation = EulerXyz::from_deg([angle, 0.0, 0.0]).to_matrix();
                     let pose = Rigid { rotation, ..Rigid::identity() };
+                    let error = PairError::new(Some(&pose), &Rigid::identity());
                     Answer {
-                        error: PairError::new(Some(&pose), &Rigid::identity()),
+                        error: PairError { right: Some(error.rotation_deg < 5.0), ..error },
                         pose: Some(pose),
                         failure: None,
                         iterations: Some(4),
@@ -225,6 +243,8 @@ pub(crate) mod tests {
                             chamfer_sum: 2.0,
                             spread: 0.3,
                         }),
+                        certainty: (scale > 1.0)
+                            .then_some(Certainty { probability: 0.9, abstain: group.severity > 1 }),
                     }
                 });
                 records.push(PairRecord {
@@ -238,7 +258,7 @@ pub(crate) mod tests {
                 });
             }
         }
-        Outcome { groups, rows: vec!["a".into(), "b".into()], records }
+        Outcome { groups, rows: vec![Row::method("a"), Row::method("b")], records }
     }
 
     #[test]
@@ -261,7 +281,7 @@ pub(crate) mod tests {
                 "cutout mean b"
             ]
         );
-        let at = |severity| summary.get("cutout", severity, "a").unwrap();
+        let at = |severity| summary.get("cutout", severity, &Row::method("a")).unwrap();
         let three = at(SeverityKey::One(3));
         assert!((three.scores.mean_rot_deg - 4.5).abs() < 1e-9);
         assert!((three.no_symmetric.unwrap().mean_rot_deg - 3.0).abs() < 1e-9);
@@ -302,5 +322,24 @@ pub(crate) mod tests {
         assert_eq!(first["no_symmetric"]["pairs"], 1);
         assert!(json[0]["skeletons"].is_null());
         assert_eq!(json[1]["skeletons"]["spread"], 0.3);
+    }
+
+    /// `b` says 0.9 everywhere and abstains at severity 3; it is right on clean pairs only.
+    #[test]
+    fn certainty_is_over_all_pairs_of_a_corruption_and_of_the_run() {
+        let summary = Summary::of(&outcome()).unwrap();
+        let b = Row::method("b");
+        let of =
+            |corruption: &str| summary.get(corruption, SeverityKey::Mean, &b).unwrap().certainty.unwrap();
+        assert_eq!((of("clean").right_of_answered, of("clean").answered), (Some(1.0), 1.0));
+        let cutout = of("cutout");
+        assert_eq!((cutout.pairs, cutout.answered, cutout.right_of_answered), (4, 0.5, Some(0.0)));
+        assert!((cutout.brier - 0.81).abs() < 1e-12 && (cutout.calibration_error - 0.9).abs() < 1e-12);
+        let all = summary.certainty(&b).unwrap();
+        assert_eq!((all.pairs, all.answered), (6, 4.0 / 6.0));
+        assert!(summary.certainty(&Row::method("a")).is_none(), "a does not say");
+        let json = serde_json::to_value(&summary).unwrap();
+        assert_eq!(json[1]["certainty"]["pairs"], 2);
+        assert!(json[0].get("certainty").is_none());
     }
 }

@@ -17,9 +17,9 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use srrf_cloud::Rigid;
+use srrf_cloud::io::{Array, read_npy, read_npz};
 
 use crate::EvalError;
-use crate::arrays::{self, Array};
 use crate::metrics::is_finite;
 use crate::pair_file::checked_rotation;
 use crate::pairs::Group;
@@ -42,8 +42,8 @@ impl Transforms {
     pub fn read(path: &Path, groups: &[Group]) -> Result<Self, EvalError> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
         let per_group = match extension.as_str() {
-            "npz" => from_npz(&arrays::read_npz(path)?.arrays, groups),
-            "npy" => matrices(&arrays::read_npy(path)?).and_then(|all| split(all, groups)),
+            "npz" => from_npz(&read_npz(path)?.arrays, groups),
+            "npy" => matrices(&read_npy(path)?).and_then(|all| split(all, groups)),
             "json" => {
                 fs::read_to_string(path).map_err(|e| e.to_string()).and_then(|text| from_json(&text, groups))
             }
@@ -188,7 +188,13 @@ mod tests {
     use srrf_cloud::EulerXyz;
 
     use super::*;
-    use crate::npz_writer::NpzWriter;
+    use srrf_cloud::io::NpzWriter;
+
+    fn npy_bytes(shape: &[usize], values: &[f64]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        Array::write(shape, values, &mut bytes).unwrap();
+        bytes
+    }
 
     fn groups() -> Vec<Group> {
         let group =
@@ -234,7 +240,7 @@ mod tests {
         check(&read);
 
         let npy = folder.path().join("tool.npy");
-        fs::write(&npy, arrays::npy_bytes(&[3, 4, 4], &values.concat()).unwrap()).unwrap();
+        fs::write(&npy, npy_bytes(&[3, 4, 4], &values.concat())).unwrap();
         check(&Transforms::read(&npy, &groups()).unwrap());
 
         let matrix = |v: &[f64]| v.chunks(4).map(<[f64]>::to_vec).collect::<Vec<_>>();
@@ -257,7 +263,7 @@ mod tests {
             fs::write(&path, bytes).unwrap();
             Transforms::read(&path, &groups()).unwrap_err().to_string()
         };
-        let npy = |shape: &[usize], values: &[f64]| arrays::npy_bytes(shape, values).unwrap();
+        let npy = npy_bytes;
         let two = message("a.npy", &npy(&[2, 4, 4], &[0.0; 32]));
         assert!(two.contains("2 transforms") && two.contains("3 pairs") && two.contains("a.npy"), "{two}");
         let shape = message("a.npy", &npy(&[3, 3, 3], &[0.0; 27]));

@@ -115,7 +115,7 @@ fn pairs_that_cannot_be_registered_are_counted() {
     // Two pairs of 4 points: on a line, and not.
     let line = [0.0, 1.0, 2.0, 3.0].map(|i| [i, 2.0 * i, -i]);
     let corner = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let mut file = srrf_eval::NpzWriter::new(fs::File::create(folder.path().join("few.npz")).unwrap());
+    let mut file = srrf_cloud::io::NpzWriter::new(fs::File::create(folder.path().join("few.npz")).unwrap());
     let clouds = [line, corner].as_flattened().as_flattened().to_vec();
     file.array("few_x", &[2, 4, 3], &clouds).unwrap();
     file.array("few_y", &[2, 4, 3], &clouds).unwrap();

@@ -15,6 +15,7 @@ use std::path::Path;
 
 use crate::{PointCloud, Rigid};
 
+mod arrays;
 mod atomic;
 #[cfg(feature = "e57")]
 mod e57;
@@ -25,6 +26,7 @@ mod kitti;
 mod las;
 mod npy;
 mod npz;
+mod npz_writer;
 mod obj;
 pub mod off;
 mod pcd;
@@ -35,9 +37,12 @@ mod single;
 mod stl;
 mod text;
 
+pub use arrays::{ArrayError, NpzArrays, read_npy, read_npz};
 pub use atomic::write_atomically;
 pub use error::{FormatError, IoError};
 pub use file::{CloudFile, Kept, format_names};
+pub use npy::Array;
+pub use npz_writer::NpzWriter;
 pub use text::parse_point;
 
 /// A file format for clouds.

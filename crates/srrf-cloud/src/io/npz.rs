@@ -2,6 +2,7 @@
 
 use std::io::{self, Cursor, Read, Write};
 
+use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
@@ -11,7 +12,7 @@ use crate::Rigid;
 
 /// Names of the array that is the cloud, the first of them that is there.
 const NAMES: [&str; 8] = ["points", "xyz", "cloud", "pcd", "coords", "pos", "vertices", "arr_0"];
-/// Arrays may unpack to this many times the archive's size and `SLACK` more: real clouds do not
+/// Arrays may unpack to this many times their size in the archive and `SLACK` more: real clouds do not
 /// come near, and a small file cannot fill the memory.
 const RATIO: u64 = 200;
 const SLACK: u64 = 1 << 20;
@@ -37,7 +38,7 @@ impl CloudFormat for Npz {
     fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
         let mut archive = open(bytes)?;
         let cloud = choose(&mut archive)?;
-        Npy.read(&unpack(&mut archive, cloud, bytes.len())?)
+        Npy.read(&unpack_at(&mut archive, cloud, bytes.len())?)
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
@@ -51,7 +52,7 @@ impl CloudFormat for Npz {
     fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
         let mut archive = open(bytes)?;
         let cloud = choose(&mut archive)?;
-        let array = unpack(&mut archive, cloud, bytes.len())?;
+        let array = unpack_at(&mut archive, cloud, bytes.len())?;
         let mut copy = Vec::new();
         Npy.rewrite(&array, motion, &mut copy)?;
         let mut written = ZipWriter::new(Cursor::new(Vec::new()));
@@ -103,11 +104,19 @@ fn choose(archive: &mut Archive) -> Result<usize, FormatError> {
     }
 }
 
-/// The bytes of an array.
-fn unpack(archive: &mut Archive, index: usize, packed: usize) -> Result<Vec<u8>, FormatError> {
-    let problem = |e: String| FormatError::Content(format!("cannot unpack the array: {e}"));
-    let entry = archive.by_index(index).map_err(|e| problem(e.to_string()))?;
-    let most = packed as u64 * RATIO + SLACK;
+/// The bytes of the array of this index.
+fn unpack_at(archive: &mut Archive, index: usize, file: usize) -> Result<Vec<u8>, FormatError> {
+    unpack(&mut archive.by_index(index).map_err(|e| cannot_unpack(e.to_string()))?, file as u64)
+}
+
+fn cannot_unpack(problem: String) -> FormatError {
+    FormatError::Content(format!("cannot unpack the array: {problem}"))
+}
+
+/// The bytes of an array, as far as they are in proportion to what the archive, a file of `file` bytes, holds of it.
+pub(super) fn unpack(entry: &mut ZipFile<'_, impl Read>, file: u64) -> Result<Vec<u8>, FormatError> {
+    let problem = cannot_unpack;
+    let most = entry.compressed_size().min(file).saturating_mul(RATIO).saturating_add(SLACK);
     let mut array = Vec::new();
     entry.take(most + 1).read_to_end(&mut array).map_err(|e| problem(e.to_string()))?;
     if array.len() as u64 > most {
@@ -170,7 +179,7 @@ mod tests {
         assert_eq!(Npz.read(&copy).unwrap(), [[1.1, 2.0, 3.0]]);
         let mut read = open(&copy).unwrap();
         assert_eq!(read.len(), 3);
-        assert_eq!(Npy.read(&unpack(&mut read, 0, copy.len()).unwrap()).unwrap(), B);
+        assert_eq!(Npy.read(&unpack_at(&mut read, 0, copy.len()).unwrap()).unwrap(), B);
     }
 
     #[test]

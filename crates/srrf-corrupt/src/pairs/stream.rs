@@ -31,6 +31,8 @@ pub enum Purpose {
     SourceResampling = 5,
     /// Resampling and order of the target.
     TargetResampling = 6,
+    /// Which part of each cloud a crop keeps.
+    Crop = 7,
 }
 
 impl Stream {

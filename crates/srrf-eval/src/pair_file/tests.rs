@@ -2,7 +2,7 @@ use srrf_corrupt::{CorruptionKind, PairConfig, Severity};
 
 use super::*;
 use crate::data;
-use crate::synthesized::{Protocol, SynthesizedPairs};
+use crate::protocol::{Protocol, SynthesizedPairs};
 
 fn synthesized() -> SynthesizedPairs {
     let protocol = Protocol {
@@ -13,6 +13,7 @@ fn synthesized() -> SynthesizedPairs {
         shapes: 5,
         seed: 3,
         pair: PairConfig { points: 67, ..PairConfig::default() },
+        crop: None,
         dcp_poses: false,
         spread: false,
     };

@@ -5,14 +5,15 @@ use srrf_view::{Number, Pair as ViewPair, Pose, Up, viewer_element};
 
 use crate::EvalError;
 use crate::pairs::{EvalPair, PairSource};
+use crate::rows::Row;
 use crate::run::{Outcome, PairRecord};
 
 /// The severity of the pairs shown.
 const SEVERITY: u8 = 3;
 /// Pairs on which the network did worst, beside a typical one of each corruption.
 const WORST: usize = 3;
-/// The method by whose error pairs are chosen.
-const BY: &str = "srrf";
+/// The row by whose error pairs are chosen.
+const BY: Row = Row::SRRF;
 
 /// A pair to show, and why.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,7 +65,7 @@ fn view<'a>(
             continue;
         };
         shown = shown.pose(
-            Pose::new(&outcome.rows[row], pose)
+            Pose::new(outcome.rows[row].to_string(), pose)
                 .number(Number::new("Rotation error", answer.error.rotation_deg).unit("°"))
                 .number(Number::new("Translation error", answer.error.translation_norm)),
         );
@@ -80,7 +81,7 @@ fn view<'a>(
 /// The pair of median error of each corruption at the middle severity (asymmetric shapes, where there
 /// are some), and the worst pairs of all.
 fn choose(outcome: &Outcome) -> Vec<Choice> {
-    let row = outcome.rows.iter().position(|r| r == BY).unwrap_or(0);
+    let row = outcome.rows.iter().position(|r| *r == BY).unwrap_or(0);
     let error = |index: &usize| outcome.records[*index].answers[row].error.rotation_deg;
     let mut chosen: Vec<Choice> = Vec::new();
     for (group, named) in outcome.groups.iter().enumerate() {
@@ -113,7 +114,7 @@ mod tests {
     #[test]
     fn typical_pairs_of_the_middle_severity_then_the_worst() {
         let mut outcome = outcome();
-        outcome.rows = vec!["icp".into(), "srrf".into()];
+        outcome.rows = vec![Row::ICP, Row::SRRF];
         let chosen = choose(&outcome);
         // Clean and cutout at 3, without the symmetric shape; then what is left and not symmetric.
         let records: Vec<(usize, usize)> = chosen

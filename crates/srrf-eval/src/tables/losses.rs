@@ -1,18 +1,19 @@
 //! A plain list of where the network loses, read off the summary.
 
-use super::paper;
-use crate::methods::ORACLE;
+use crate::methods::is_ours;
 use crate::quantities::{QUANTITIES, Quantity};
+use crate::report::paper;
+use crate::rows::Row;
 use crate::summary::{SeverityKey, Summary};
 
 /// Sentences, one for each loss that shows in the printed digits; empty where the run lacks `srrf`.
 pub(crate) fn losses(summary: &Summary) -> Vec<String> {
     let mut found = Vec::new();
-    for ours in ["srrf", "srrf+refine"] {
+    for ours in [Row::SRRF, Row::SRRF_REFINE, Row::SRRF_REGISTER] {
         for quantity in QUANTITIES.iter().filter(|q| ["rmse_r", "median_rot_deg", "recall"].contains(&q.key))
         {
             for corruption in summary.corruptions() {
-                found.extend(against_others(summary, quantity, corruption, ours));
+                found.extend(against_others(summary, quantity, corruption, &ours));
             }
         }
     }
@@ -24,8 +25,8 @@ pub(crate) fn losses(summary: &Summary) -> Vec<String> {
         .corruptions()
         .into_iter()
         .filter_map(|corruption| {
-            let ours = summary.get(corruption, SeverityKey::Mean, "srrf")?.scores.rmse_r;
-            let paper = paper::find(corruption, "srrf")?.values[1];
+            let ours = summary.get(corruption, SeverityKey::Mean, &Row::SRRF)?.scores.rmse_r;
+            let paper = paper::find(corruption, &Row::SRRF)?.values[1];
             (ours > paper).then(|| format!("{corruption} ({ours:.2} against {paper:.2})"))
         })
         .collect();
@@ -39,13 +40,13 @@ pub(crate) fn losses(summary: &Summary) -> Vec<String> {
 }
 
 /// A sentence where another method is better than `ours`.
-fn against_others(summary: &Summary, quantity: &Quantity, corruption: &str, ours: &str) -> Option<String> {
-    let value = |method: &str| quantity.shown(&summary.get(corruption, SeverityKey::Mean, method)?.scores);
+fn against_others(summary: &Summary, quantity: &Quantity, corruption: &str, ours: &Row) -> Option<String> {
+    let value = |method: &Row| quantity.shown(&summary.get(corruption, SeverityKey::Mean, method)?.scores);
     let mine = value(ours)?;
     let printed = |v: f64| format!("{v:.*}", quantity.digits);
     let better =
         |v: f64| printed(v) != printed(mine) && if quantity.more_is_better { v > mine } else { v < mine };
-    let others = summary.methods().into_iter().filter(|m| *m != ORACLE && !m.starts_with("srrf"));
+    let others = summary.methods().into_iter().filter(|m| **m != Row::Oracle && !is_ours(m));
     let ahead: Vec<String> = others
         .filter_map(|m| value(m).filter(|v| better(*v)).map(|v| format!("{m} ({})", printed(v))))
         .collect();
@@ -60,14 +61,14 @@ fn against_others(summary: &Summary, quantity: &Quantity, corruption: &str, ours
 
 /// Sentences where a branch beats the fusion, or refinement makes it worse.
 fn against_itself(summary: &Summary, quantity: &Quantity, corruption: &str) -> Vec<String> {
-    let value = |method: &str| Some(summary.get(corruption, SeverityKey::Mean, method)?.scores.rmse_r);
+    let value = |method: &Row| Some(summary.get(corruption, SeverityKey::Mean, method)?.scores.rmse_r);
     let printed = |v: f64| format!("{v:.*}", quantity.digits);
-    let Some(fused) = value("srrf") else { return Vec::new() };
+    let Some(fused) = value(&Row::SRRF) else { return Vec::new() };
     let mut found = Vec::new();
     for (other, what) in
-        [("srrf-dense", "the dense branch alone"), ("srrf-skeleton", "the skeleton branch alone")]
+        [(Row::SRRF_DENSE, "the dense branch alone"), (Row::SRRF_SKELETON, "the skeleton branch alone")]
     {
-        if let Some(v) = value(other).filter(|v| *v < fused && printed(*v) != printed(fused)) {
+        if let Some(v) = value(&other).filter(|v| *v < fused && printed(*v) != printed(fused)) {
             found.push(format!(
                 "{corruption}: {what} ({}) is ahead of the fusion ({}) in RMSE(R).",
                 printed(v),
@@ -75,7 +76,7 @@ fn against_itself(summary: &Summary, quantity: &Quantity, corruption: &str) -> V
             ));
         }
     }
-    if let Some(v) = value("srrf+refine").filter(|v| *v > fused && printed(*v) != printed(fused)) {
+    if let Some(v) = value(&Row::SRRF_REFINE).filter(|v| *v > fused && printed(*v) != printed(fused)) {
         found.push(format!(
             "{corruption}: refinement raises RMSE(R) from {} to {}.",
             printed(fused),
@@ -94,21 +95,23 @@ mod tests {
     fn only_losses_are_listed() {
         // The second method of the made-up outcome has ten times the error of the first, but not on
         // clean pairs, where both are exact.
-        let named = |rows: [&str; 2]| {
+        let named = |rows: [Row; 2]| {
             let mut outcome = outcome();
-            outcome.rows = rows.map(str::to_owned).to_vec();
+            outcome.rows = rows.to_vec();
             losses(&Summary::of(&outcome).unwrap())
         };
-        let behind = named(["icp", "srrf"]);
+        let behind = named([Row::ICP, Row::SRRF]);
         assert!(behind.iter().any(|l| l.starts_with("cutout: RMSE(R) of srrf is 18.26, behind icp (1.83)")));
         assert!(!behind.iter().any(|l| l.starts_with("clean")), "{behind:?}");
         assert!(behind.last().unwrap().contains("cutout (18.26 against 2.86)"));
-        assert!(named(["srrf", "icp"]).is_empty());
-        let refined = named(["srrf", "srrf+refine"]);
+        assert!(named([Row::SRRF, Row::ICP]).is_empty());
+        let refined = named([Row::SRRF, Row::SRRF_REFINE]);
         assert!(
             refined.iter().any(|l| l.contains("refinement raises RMSE(R) from 1.83 to 18.26")),
             "{refined:?}"
         );
-        assert!(named(["srrf-dense", "srrf"]).iter().any(|l| l.contains("the dense branch alone (1.83)")));
+        assert!(
+            named([Row::SRRF_DENSE, Row::SRRF]).iter().any(|l| l.contains("the dense branch alone (1.83)"))
+        );
     }
 }

@@ -1,25 +1,17 @@
 //! `srrf-eval tables`: the paper's tables and figures, our ablations, and one page to look at it all.
 //!
-//! 1. `cast` sets up the methods, `plan` says which pairs each experiment scores;
+//! 1. [`MethodSet`] sets up the methods, `plan` says which pairs each experiment scores;
 //! 2. every experiment goes through [`Run`] and the [`Cache`], the same path as the plain command;
-//! 3. `sheets`, `figures` and `chosen` make tables, pictures and views from the summaries;
-//! 4. `report` joins them into a `document::Document`, and `write` puts it into the folder.
+//! 3. `sections` joins tables, pictures and views of the summaries into a document;
+//! 4. [`report`] writes it into the folder.
 
-mod cast;
 mod chosen;
-mod document;
-mod figures;
 mod losses;
 mod options;
-mod page;
-mod paper;
 mod plan;
-mod report;
 mod sampling;
-mod sheet;
-mod sheets;
+mod sections;
 mod thresholds;
-mod write;
 
 use std::collections::BTreeMap;
 
@@ -29,20 +21,21 @@ use srrf_args::flags::Threads;
 
 use crate::cache::Cache;
 use crate::cli::weights_by_method;
-use crate::methods::{METHODS, Method, MethodContext};
+use crate::method_set::{DefaultRows, MethodSet};
+use crate::methods::{Method, MethodContext, registry};
 use crate::pairs::PairSource;
+use crate::protocol::{MIDDLE, Protocol, SynthesizedPairs};
+use crate::report::book;
+use crate::report::numbers::numbers;
+use crate::report::write::{self, Part};
+use crate::rows::Row;
 use crate::run::{Outcome, Run};
 use crate::summary::Summary;
-use crate::synthesized::{Protocol, SynthesizedPairs};
-use crate::{EvalError, data};
-use cast::Cast;
+use crate::{EvalError, data, report};
 use sampling::SampledPairs;
 
 /// Built-in shapes that are scored without data.
 const BUILT_IN_SHAPES: usize = 20;
-
-/// The rows of a network.
-const NETWORK_ROWS: [&str; 3] = ["srrf-dense", "srrf-skeleton", "srrf"];
 
 /// What [`make`] says while it works.
 pub enum Progress<'a> {
@@ -69,7 +62,9 @@ struct Evidence {
     parts: BTreeMap<&'static str, Measured>,
     /// Networks that were trained otherwise, by name.
     variants: Vec<(String, Measured)>,
-    cast: Cast,
+    methods: MethodSet,
+    /// For each method that learns, its weights.
+    weights: BTreeMap<String, String>,
     /// Parts that were wanted and could not be made, and why.
     missing: Vec<(String, String)>,
     shapes: usize,
@@ -90,10 +85,11 @@ impl Evidence {
 pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, EvalError> {
     let weights = weights_by_method(&options.weights);
     let context = MethodContext { weights, device: options.device.clone() };
-    let cast = Cast::new(&options.methods, &context)?;
-    crate::report::prepare(&options.out)?;
+    let methods = MethodSet::new(&options.methods, DefaultRows::Tables, &context)?;
+    report::prepare(&options.out)?;
+    options.book.as_deref().map_or(Ok(()), report::prepare)?;
     let cache = Cache::open(&options.cache_folder(), &options.device)?;
-    for (name, reason) in &cast.left_out {
+    for (name, reason) in &methods.left_out {
         say(Progress::Line(&format!("left out: {name}: {reason}")));
     }
     let shapes = match options.shapes {
@@ -102,12 +98,14 @@ pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, E
     };
     let stage = Stage { options, cache: &cache, shapes };
     let mut parts = BTreeMap::new();
-    for experiment in plan::experiments(options, shapes, &cast) {
+    for experiment in plan::experiments(options, shapes, &methods) {
         let pairs = stage.pairs(experiment.protocol)?;
-        let measured = stage.score(experiment.title, &pairs, &cast.methods, experiment.rows, say)?;
+        let measured = stage.score(experiment.title, &pairs, &methods.methods, experiment.rows, say)?;
         parts.insert(experiment.key, measured);
     }
-    let mut evidence = Evidence { parts, variants: Vec::new(), cast, missing: Vec::new(), shapes };
+    let weights = methods.weights();
+    let mut evidence =
+        Evidence { parts, variants: Vec::new(), methods, weights, missing: Vec::new(), shapes };
     if evidence.same_shapes(options).is_none() {
         let parts = plan::COMPARED.into_iter().filter(|part| evidence.parts.contains_key(part));
         let compared = parts.chain(options.variant.iter().map(|(name, _)| name.as_str()));
@@ -120,8 +118,21 @@ pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, E
     stage.thresholds(&mut evidence, &context, say)?;
     stage.samples(&mut evidence, say)?;
     say(Progress::Line(&format!("{} answers were taken from the cache", cache.reused())));
-    let document = report::document(options, &stage, &evidence, &context)?;
-    write::all(options, &document, &evidence)
+    let document = sections::document(options, &stage, &evidence, &context)?;
+    let parts = evidence.parts.iter().map(|(part, measured)| (*part, measured));
+    let variants = evidence.variants.iter().map(|(name, measured)| (name.as_str(), measured));
+    let parts: Vec<Part<'_>> = parts
+        .chain(variants)
+        .map(|(part, measured)| Part { part, data: &measured.data, summary: &measured.summary })
+        .collect();
+    let mut written = write::all(&options.out, &document, &parts)?;
+    if let Some(folder) = &options.book {
+        let of = |part: &str| evidence.parts.get(part).map(|measured| &measured.summary);
+        let numbers = numbers(&document, of("main"), of("partial"));
+        let files = book::write(folder, &document, &numbers)?;
+        written.extend(files.into_iter().map(|name| folder.join(name).display().to_string()));
+    }
+    Ok(written)
 }
 
 /// What all experiments share.
@@ -135,7 +146,7 @@ impl Stage<'_> {
     /// The protocol of ablations at one severity.
     fn middle(&self) -> Protocol {
         let same = plan::same_shapes_protocol(self.options, self.shapes);
-        Protocol { severities: vec![plan::MIDDLE], ..same }
+        Protocol { severities: vec![MIDDLE], ..same }
     }
 
     fn pairs(&self, protocol: Protocol) -> Result<SynthesizedPairs, EvalError> {
@@ -147,8 +158,8 @@ impl Stage<'_> {
         &self,
         title: &str,
         pairs: &dyn PairSource,
-        methods: &[(&'static [&'static str], Method)],
-        rows: Vec<String>,
+        methods: &[Method],
+        rows: Vec<Row>,
         say: Listener<'_>,
     ) -> Result<Measured, EvalError> {
         say(Progress::Start(title, pairs.groups().iter().map(|g| g.pairs).sum()));
@@ -180,15 +191,14 @@ impl Stage<'_> {
                 evidence.missing.push((title.to_owned(), reason));
                 continue;
             }
-            let entries = METHODS.iter().filter(|m| weights.contains_key(m.name));
-            let rows: Vec<String> = entries.flat_map(|m| m.rows).map(|row| (*row).to_owned()).collect();
+            let entries = registry().iter().filter(|m| weights.contains_key(m.name));
+            let rows: Vec<Row> = entries.flat_map(|m| m.rows()).collect();
             let context = MethodContext { weights, device: options.device.clone() };
-            let cast = Cast::new(&rows, &context)?;
-            let measured =
-                self.score(title, &self.pairs(protocol)?, &cast.methods, cast.rows.clone(), say)?;
+            let set = MethodSet::of_rows(&rows, false, &context)?;
+            let measured = self.score(title, &self.pairs(protocol)?, &set.methods, set.rows.clone(), say)?;
             evidence.parts.insert(key, measured);
             let named = |(method, weights)| (format!("{method}, {title}"), weights);
-            evidence.cast.weights.extend(cast.weights.into_iter().map(named));
+            evidence.weights.extend(set.weights().into_iter().map(named));
         }
         Ok(())
     }
@@ -197,10 +207,10 @@ impl Stage<'_> {
     fn variants(&self, evidence: &mut Evidence, say: Listener<'_>) -> Result<(), EvalError> {
         for (name, weights) in &self.options.variant {
             let context = MethodContext::of_srrf(Some(weights.clone()), &self.options.device);
-            let cast = Cast::new(&NETWORK_ROWS.map(str::to_owned), &context)?;
+            let set = MethodSet::of_rows(&Row::NETWORK, false, &context)?;
             let pairs = self.pairs(self.middle())?;
-            let measured = self.score(name, &pairs, &cast.methods, cast.rows.clone(), say)?;
-            evidence.cast.weights.extend(cast.weights.into_values().map(|w| (name.clone(), w)));
+            let measured = self.score(name, &pairs, &set.methods, set.rows.clone(), say)?;
+            evidence.weights.extend(set.weights().into_values().map(|w| (name.clone(), w)));
             evidence.variants.push((name.clone(), measured));
         }
         Ok(())
@@ -213,13 +223,13 @@ impl Stage<'_> {
         context: &MethodContext,
         say: Listener<'_>,
     ) -> Result<(), EvalError> {
-        if !self.options.wants("thresholds") || evidence.cast.method("srrf").is_none() {
+        if !self.options.wants("thresholds") || evidence.methods.method(&Row::SRRF).is_none() {
             return Ok(());
         }
         let methods = thresholds::methods(context)?;
         let protocol =
             Protocol { clean: false, corruptions: thresholds::CORRUPTIONS.to_vec(), ..self.middle() };
-        let rows = methods.iter().flat_map(|(rows, _)| rows.iter().map(|r| (*r).to_owned())).collect();
+        let rows = methods.iter().flat_map(Method::rows).collect();
         let measured = self.score("inlier thresholds", &self.pairs(protocol)?, &methods, rows, say)?;
         evidence.parts.insert("thresholds", measured);
         Ok(())
@@ -230,14 +240,16 @@ impl Stage<'_> {
         if !self.options.wants("table4") {
             return Ok(());
         }
-        let rows = evidence.cast.only(&report::SAMPLED_ROWS);
-        let Some(network) = evidence.cast.method("srrf").filter(|_| !rows.is_empty()) else { return Ok(()) };
-        if !rows.iter().any(|r| r == "dcp") {
+        let rows = evidence.methods.only(&sections::SAMPLED_ROWS);
+        let Some(network) = evidence.methods.method(&Row::SRRF).filter(|_| !rows.is_empty()) else {
+            return Ok(());
+        };
+        if !rows.contains(&Row::DCP) {
             let reason = "DCP has no weights here; other methods stand in".to_owned();
             evidence.missing.push(("DCP in table 4".to_owned(), reason));
         }
         let pairs = self.sampled(&*network.register)?;
-        let measured = self.score("samples of clean pairs", &pairs, &evidence.cast.methods, rows, say)?;
+        let measured = self.score("samples of clean pairs", &pairs, &evidence.methods.methods, rows, say)?;
         evidence.parts.insert("table4", measured);
         Ok(())
     }

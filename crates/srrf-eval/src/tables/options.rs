@@ -1,13 +1,13 @@
 //! The options of `srrf-eval tables`.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use srrf_args::flags::{MOST_POINTS, MOST_SHAPES, MOST_THREADS, help, value};
 use srrf_args::numbers::{entry, whole};
+use srrf_model::embedded;
 
-use super::cast::model_or;
 use crate::cli::{OF_BASELINES, TEST_SPLIT, weights_by_method};
 
 /// Makes all tables and figures of the report: the paper's tables 1 to 5 with its own numbers beside
@@ -121,6 +121,11 @@ pub struct TablesOptions {
     #[arg(short, long = "output", alias = "out", value_name = value::FOLDER, default_value = "report")]
     pub out: PathBuf,
 
+    /// Write the tables as pages of a book into this folder too, their pictures beside them, and `numbers.json`, every printed
+    /// number by its key
+    #[arg(long, value_name = value::FOLDER)]
+    pub book: Option<PathBuf>,
+
     /// Folder for the answers that are kept [default: `cache` in the report's folder]
     #[arg(long, value_name = value::FOLDER)]
     pub cache: Option<PathBuf>,
@@ -139,9 +144,10 @@ const ROWS_LEFT_OUT: &str = "[default: the paper's methods, and ours]. Those wit
      report says so";
 
 /// Names of the parts of the report.
-pub(crate) const PARTS: [&str; 10] = [
+pub(crate) const PARTS: [&str; 11] = [
     "main",
     "severity",
+    "partial",
     "clean-trained",
     "table4",
     "table5",
@@ -196,4 +202,10 @@ impl TablesOptions {
     pub(crate) fn cache_folder(&self) -> PathBuf {
         self.cache.clone().unwrap_or_else(|| self.out.join("cache"))
     }
+}
+
+/// The weights that an option gives, or a model of the program of this name, if there is one.
+fn model_or(option: Option<&Path>, name: &str) -> Option<PathBuf> {
+    let built_in = || embedded::contains(name).then(|| PathBuf::from(name));
+    option.map(Path::to_owned).or_else(built_in)
 }

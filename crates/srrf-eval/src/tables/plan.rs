@@ -2,17 +2,25 @@
 
 use srrf_corrupt::{Corrupt, CorruptionKind, Mixture, PairConfig, Sampling, Severity};
 
-use super::cast::Cast;
 use super::options::TablesOptions;
-use crate::methods::ORACLE;
-use crate::synthesized::Protocol;
-
-/// The severity of the ablations.
-pub(crate) const MIDDLE: Severity = Severity::ALL[2];
+use crate::method_set::MethodSet;
+use crate::protocol::{MIDDLE, Protocol};
+use crate::rows::Row;
 
 /// Rows of the ablations that compare protocols.
-const ABLATION_ROWS: [&str; 7] =
-    ["icp", "fpfh-ransac", ORACLE, "srrf-dense", "srrf-skeleton", "srrf", "srrf+refine"];
+const ABLATION_ROWS: [Row; 8] = [
+    Row::ICP,
+    Row::FPFH_RANSAC,
+    Row::Oracle,
+    Row::SRRF_DENSE,
+    Row::SRRF_SKELETON,
+    Row::SRRF,
+    Row::SRRF_REFINE,
+    Row::SRRF_REGISTER,
+];
+
+/// Share of each cloud that the crop of partial overlap keeps, as in RPMNet's tables.
+pub(crate) const PARTIAL: f64 = 0.7;
 
 /// Experiments whose tables compare them with all severities on the same shapes.
 pub(crate) const COMPARED: [&str; 3] = ["one-sided", "independent", "beyond"];
@@ -44,7 +52,7 @@ pub(crate) struct Experiment {
     /// Its pairs.
     pub protocol: Protocol,
     /// Its rows.
-    pub rows: Vec<String>,
+    pub rows: Vec<Row>,
 }
 
 /// The protocol of the main tables.
@@ -63,31 +71,43 @@ pub(crate) fn same_shapes_protocol(options: &TablesOptions, shapes: usize) -> Pr
         shapes: if options.spread { (shapes / Severity::ALL.len()).max(1) } else { shapes },
         seed: options.seed,
         pair: PairConfig { points: options.points, ..PairConfig::default() },
+        crop: None,
         dcp_poses: false,
         spread: false,
     }
 }
 
 /// The main experiment and the ablations of protocols that are wanted.
-pub(crate) fn experiments(options: &TablesOptions, shapes: usize, cast: &Cast) -> Vec<Experiment> {
+pub(crate) fn experiments(options: &TablesOptions, shapes: usize, methods: &MethodSet) -> Vec<Experiment> {
     let same = same_shapes_protocol(options, shapes);
     let middle = Protocol { severities: vec![MIDDLE], ..same.clone() };
     // Every point is copied at severity 5 already.
     let extendable = CorruptionKind::ALL.into_iter().filter(|k| *k != CorruptionKind::Upsampling);
-    let rows = || cast.only(&ABLATION_ROWS);
-    let without_oracle = rows().into_iter().filter(|row| row != ORACLE).collect();
+    let rows = || methods.only(&ABLATION_ROWS);
+    let without_oracle = rows().into_iter().filter(|row| *row != Row::Oracle).collect();
     let all = [
         Experiment {
             key: "main",
             title: "all corruptions",
             protocol: main_protocol(options, shapes),
-            rows: cast.rows.clone(),
+            rows: methods.rows.clone(),
         },
         Experiment {
             key: "severity",
             title: "all severities",
             protocol: same.clone(),
-            rows: cast.rows.clone(),
+            rows: methods.rows.clone(),
+        },
+        Experiment {
+            key: "partial",
+            title: "partial overlap",
+            protocol: Protocol {
+                corruptions: Vec::new(),
+                severities: Vec::new(),
+                crop: Some(PARTIAL),
+                ..main_protocol(options, shapes)
+            },
+            rows: methods.rows.clone(),
         },
         Experiment {
             key: "one-sided",

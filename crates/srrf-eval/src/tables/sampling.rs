@@ -6,7 +6,7 @@ use srrf_corrupt::{Pair, Purpose, Stream};
 
 use crate::EvalError;
 use crate::pairs::{EvalPair, Group, PairSource};
-use crate::synthesized::SynthesizedPairs;
+use crate::protocol::SynthesizedPairs;
 
 /// How the points of the pairs of a group are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,7 +112,7 @@ mod tests {
 
     use super::*;
     use crate::data;
-    use crate::synthesized::Protocol;
+    use crate::protocol::Protocol;
 
     /// Its skeleton of a cloud is the cloud's first 5 points.
     struct FirstFive;
@@ -146,6 +146,7 @@ mod tests {
             shapes: 2,
             seed: 3,
             pair: PairConfig { points: 67, ..PairConfig::default() },
+            crop: None,
             dcp_poses: false,
             spread: false,
         };

@@ -5,7 +5,7 @@ use srrf_corrupt::CorruptionKind;
 use srrf_model::{InlierTest, IntegrationConfig, SrrfRegister};
 
 use crate::EvalError;
-use crate::methods::{Method, MethodContext, network, plain};
+use crate::methods::{Method, MethodContext, SetupError, network};
 
 /// The corruptions that are scored: two of density, two of noise, one of shape.
 pub(crate) const CORRUPTIONS: [CorruptionKind; 5] = [
@@ -17,15 +17,15 @@ pub(crate) const CORRUPTIONS: [CorruptionKind; 5] = [
 ];
 
 /// A variant: its row, the test, the two thresholds (dense, skeleton), the sharpness.
-type Variant = (&'static [&'static str], InlierTest, [f64; 2], f64);
+type Variant = (&'static str, InlierTest, [f64; 2], f64);
 
 const VARIANTS: [Variant; 6] = [
-    (&["nearest 0.03"], InlierTest::Nearest, [0.03; 2], 1.0),
-    (&["nearest 0.05"], InlierTest::Nearest, [0.05; 2], 1.0),
-    (&["nearest 0.1"], InlierTest::Nearest, [0.1; 2], 1.0),
-    (&["nearest 0.2"], InlierTest::Nearest, [0.2; 2], 1.0),
-    (&["soft match 0.05, 0.1"], InlierTest::SoftMatch, [0.05, 0.1], 1.0),
-    (&["lambda 0.5"], InlierTest::Nearest, [0.05; 2], 0.0),
+    ("nearest 0.03", InlierTest::Nearest, [0.03; 2], 1.0),
+    ("nearest 0.05", InlierTest::Nearest, [0.05; 2], 1.0),
+    ("nearest 0.1", InlierTest::Nearest, [0.1; 2], 1.0),
+    ("nearest 0.2", InlierTest::Nearest, [0.2; 2], 1.0),
+    ("soft match 0.05, 0.1", InlierTest::SoftMatch, [0.05, 0.1], 1.0),
+    ("lambda 0.5", InlierTest::Nearest, [0.05; 2], 0.0),
 ];
 
 /// What the names of the variants say, for the note of the table.
@@ -51,12 +51,12 @@ impl Register for Named {
     }
 }
 
-/// All variants with the rows that they fill.
+/// All variants, a row each.
 ///
 /// # Errors
 /// [`EvalError::Setup`] where the weights cannot be had.
-pub(crate) fn methods(context: &MethodContext) -> Result<Vec<(&'static [&'static str], Method)>, EvalError> {
-    let set_up = |&(rows, test, [dense, skeleton], sharpness): &Variant| {
+pub(crate) fn methods(context: &MethodContext) -> Result<Vec<Method>, EvalError> {
+    let set_up = |&(name, test, [dense, skeleton], sharpness): &Variant| {
         let (mut loaded, weights) = network(context)?;
         loaded.config.integration = IntegrationConfig {
             test,
@@ -66,14 +66,13 @@ pub(crate) fn methods(context: &MethodContext) -> Result<Vec<(&'static [&'static
             skeleton_weight: 1.0,
             standard_errors: None,
         };
-        let device = srrf_model::device(&context.device).map_err(|e| e.to_string())?;
-        let method = Method {
+        let inner = SrrfRegister::new(loaded, srrf_model::device(&context.device)?);
+        Ok(Method {
             weights: Some(weights),
             settings: format!("{test:?}, thresholds {dense} and {skeleton}, sharpness {sharpness}"),
-            ..plain(Named { inner: SrrfRegister::new(loaded, device), name: rows[0] })
-        };
-        Ok((rows, method))
+            ..Method::new(Named { inner, name })
+        })
     };
-    let named = |problem: String| EvalError::Setup { name: "srrf".into(), problem };
+    let named = |source: SetupError| EvalError::Setup { name: "srrf", source };
     VARIANTS.iter().map(|variant| set_up(variant).map_err(named)).collect()
 }

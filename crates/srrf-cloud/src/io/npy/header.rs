@@ -20,7 +20,7 @@ impl Kind {
             b"i2" => Scalar::I16,
             b"i4" => Scalar::I32,
             b"i8" => Scalar::I64,
-            b"u1" => Scalar::U8,
+            b"u1" | b"b1" => Scalar::U8, // booleans are bytes of 0 and 1
             b"u2" => Scalar::U16,
             b"u4" => Scalar::U32,
             b"u8" => Scalar::U64,

@@ -1,6 +1,9 @@
 //! NumPy arrays of points.
 
+mod array;
 mod header;
+
+pub use array::Array;
 
 use std::io::{self, Write};
 

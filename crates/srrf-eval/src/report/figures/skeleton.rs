@@ -9,8 +9,8 @@ use srrf_model::weights::LoadedModel;
 
 use super::canvas::{BLUE, GREEN, GREY, Grid, RED, View, thinned};
 use crate::EvalError;
-use crate::methods::{MethodContext, network};
-use crate::tables::document::Figure;
+use crate::methods::{MethodContext, SetupError, network};
+use crate::report::document::Figure;
 
 /// Colours of the skeleton points whose weights are shown.
 const WEIGHED: [&str; 5] = [RED, BLUE, "#cc79a7", "#e69f00", GREEN];
@@ -29,11 +29,11 @@ struct Extracted {
 
 /// The skeleton of `cloud` by the network of `context`.
 fn extract(context: &MethodContext, cloud: &PointCloud) -> Result<Extracted, EvalError> {
-    let failed = |problem: String| EvalError::Setup { name: "srrf".into(), problem };
+    let failed = |source: SetupError| EvalError::Setup { name: "srrf", source };
     let (LoadedModel { model, .. }, _) = network(context).map_err(failed)?;
-    let device = srrf_model::device(&context.device).map_err(|e| failed(e.to_string()))?;
+    let device = srrf_model::device(&context.device).map_err(|e| failed(e.into()))?;
     let batch = PairBatch::new(&[(cloud, cloud)], &device)
-        .ok_or_else(|| failed("the cloud makes no batch".into()))?;
+        .ok_or_else(|| failed(SetupError::Network("the cloud makes no batch")))?;
     let skeleton = model.sem.forward(batch.source)?;
     let rows = |values: Vec<f64>| values.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
     let frame = batch.frames[0];

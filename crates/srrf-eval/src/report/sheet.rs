@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::table::aligned;
+use crate::rows::Row;
 
 /// A cell of a [`Sheet`].
 #[derive(Debug, Clone, PartialEq)]
@@ -31,12 +31,19 @@ impl Cell {
         }
     }
 
-    fn printed(&self) -> String {
+    /// The cell as it is printed.
+    pub fn printed(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
             Self::Number(value, digits) | Self::Best(value, digits) => format!("{value:.digits$}"),
             Self::None => "-".into(),
         }
+    }
+}
+
+impl From<&Row> for Cell {
+    fn from(row: &Row) -> Self {
+        Self::Text(row.to_string())
     }
 }
 
@@ -97,8 +104,8 @@ impl Sheet {
         mark_best(cells.map(|(_, cell)| cell).collect(), more_is_better);
     }
 
-    /// As Markdown, under a heading of the third level.
-    pub fn markdown(&self) -> String {
+    /// As Markdown, under a heading of this level; a plain line where it is 0.
+    pub fn markdown(&self, level: usize) -> String {
         let mut lines = vec![self.head.clone()];
         for row in &self.rows {
             let bold = |cell: &Cell| match cell {
@@ -108,7 +115,8 @@ impl Sheet {
             lines.push(row.iter().map(bold).collect());
         }
         let note = if self.note.is_empty() { String::new() } else { format!("{}\n\n", self.note) };
-        format!("### {}\n\n{note}{}", self.title, aligned(&lines))
+        let marks = format!("{} ", "#".repeat(level));
+        format!("{}{}\n\n{note}{}", marks.trim_start(), self.title, aligned(&lines))
     }
 
     /// As CSV, numbers in full.
@@ -163,6 +171,33 @@ impl Sheet {
     }
 }
 
+/// A Markdown table whose columns line up in plain text too. The first line is the header; columns
+/// of numbers are set to the right.
+fn aligned(lines: &[Vec<String>]) -> String {
+    let columns = lines[0].len();
+    let width = |c: usize| lines.iter().map(|l| l[c].chars().count()).max().unwrap_or(0).max(3);
+    let numeric =
+        |c: usize| lines[1..].iter().all(|l| l[c].trim_matches('*').parse::<f64>().is_ok() || l[c] == "-");
+    let mut text = String::new();
+    for (index, cells) in lines.iter().enumerate() {
+        for (c, cell) in cells.iter().enumerate() {
+            let pad = " ".repeat(width(c) - cell.chars().count());
+            let (left, right) = if numeric(c) { (pad.as_str(), "") } else { ("", pad.as_str()) };
+            // Writing to a String cannot fail.
+            let _ = write!(text, "| {left}{cell}{right} ");
+        }
+        text += "|\n";
+        if index == 0 {
+            for c in 0..columns {
+                let rule = "-".repeat(width(c) + 1);
+                text += &if numeric(c) { format!("|{rule}:") } else { format!("|-{rule}") };
+            }
+            text += "|\n";
+        }
+    }
+    text
+}
+
 /// Text for HTML, in elements and quoted attributes.
 pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
@@ -186,7 +221,7 @@ mod tests {
 
     #[test]
     fn the_best_is_bold_and_what_prints_alike_too() {
-        let text = sheet().markdown();
+        let text = sheet().markdown(3);
         assert_eq!(text.matches("**2.00**").count(), 2, "{text}");
         assert_eq!(text.matches("**").count(), 2 * 3, "{text}");
         assert!(text.contains("**0.9**") && text.contains("Read \"this\"."), "{text}");

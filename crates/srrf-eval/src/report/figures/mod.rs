@@ -9,11 +9,12 @@ use canvas::{BLUE, GREEN, Grid, RED, View, thinned};
 use srrf_cloud::Rigid;
 use srrf_corrupt::Severity;
 
-use super::document::Figure;
 use crate::EvalError;
-use crate::curves;
 use crate::pairs::PairSource;
 use crate::quantities::QUANTITIES;
+use crate::report::curves;
+use crate::report::document::Figure;
+use crate::rows::Row;
 use crate::run::Outcome;
 use crate::summary::Summary;
 
@@ -24,19 +25,20 @@ const DRAWN: usize = 220;
 const MOST_CURVES: usize = 8;
 
 /// Rows that curves show, the most important first.
-const CURVES: [&str; 12] = [
-    "oracle",
-    "icp",
-    "srrf",
-    "srrf+refine",
-    "rgm",
-    "dcp",
-    "fpfh-ransac",
-    "panet",
-    "equi-gspr",
-    "pointnetlk",
-    "srrf-dense",
-    "srrf-skeleton",
+const CURVES: [Row; 13] = [
+    Row::Oracle,
+    Row::ICP,
+    Row::SRRF,
+    Row::SRRF_REFINE,
+    Row::SRRF_REGISTER,
+    Row::RGM,
+    Row::DCP,
+    Row::FPFH_RANSAC,
+    Row::method("panet"),
+    Row::method("equi-gspr"),
+    Row::method("pointnetlk"),
+    Row::SRRF_DENSE,
+    Row::SRRF_SKELETON,
 ];
 
 /// Error against severity, one picture for each principal quantity.
@@ -45,9 +47,9 @@ const CURVES: [&str; 12] = [
 /// [`EvalError::Picture`] with the drawing library's reason.
 pub(crate) fn severity_curves(summary: &Summary) -> Result<Vec<Figure>, EvalError> {
     let methods = summary.methods();
-    let shown: Vec<&str> = CURVES.into_iter().filter(|m| methods.contains(m)).take(MOST_CURVES).collect();
+    let shown: Vec<Row> = CURVES.into_iter().filter(|m| methods.contains(&m)).take(MOST_CURVES).collect();
     let mut summary = summary.clone();
-    summary.rows.retain(|row| shown.contains(&row.method.as_str()));
+    summary.rows.retain(|row| shown.contains(&row.method));
     let mut figures = Vec::new();
     for quantity in QUANTITIES.iter().filter(|q| q.principal) {
         let file = format!("severity-{}.svg", quantity.key.replace('_', "-"));
@@ -102,7 +104,7 @@ pub(crate) fn corruption_sheet(pairs: &dyn PairSource, item: usize) -> Result<Op
 pub(crate) fn registrations(
     pairs: &dyn PairSource,
     outcome: &Outcome,
-    shown: &[&str],
+    shown: &[Row],
 ) -> Result<Option<Figure>, EvalError> {
     let rows: Vec<usize> = shown.iter().filter_map(|s| outcome.rows.iter().position(|r| r == s)).collect();
     let groups: Vec<usize> =
@@ -144,7 +146,7 @@ pub(crate) fn registrations(
         caption: format!(
             "A pair of each corruption at severity 3, as given and as {} left it: source blue, target green, moved \
              source red; the angle is the rotation error",
-            shown.join(", ")
+            shown.iter().map(Row::to_string).collect::<Vec<_>>().join(", ")
         ),
         svg: grid.svg(),
     }))
@@ -172,7 +174,7 @@ fn panel(
 pub(crate) fn sampled_registrations(
     pairs: &dyn PairSource,
     outcome: &Outcome,
-    row: &str,
+    row: &Row,
     item: usize,
 ) -> Result<Option<Figure>, EvalError> {
     let Some(method) = outcome.rows.iter().position(|r| r == row) else { return Ok(None) };
@@ -204,8 +206,8 @@ mod tests {
 
     use super::*;
     use crate::data;
+    use crate::protocol::{Protocol, SynthesizedPairs};
     use crate::run::Run;
-    use crate::synthesized::{Protocol, SynthesizedPairs};
 
     #[test]
     fn every_panel_is_drawn() {
@@ -217,6 +219,7 @@ mod tests {
             shapes: 3,
             seed: 3,
             pair: PairConfig { points: 65, ..PairConfig::default() },
+            crop: None,
             dcp_poses: false,
             spread: false,
         };
@@ -225,7 +228,7 @@ mod tests {
             pairs: &pairs,
             methods: &[],
             transforms: vec![],
-            rows: vec!["oracle".into()],
+            rows: vec![Row::Oracle],
             threads: 1,
             cache: None,
         };
@@ -234,10 +237,10 @@ mod tests {
         let sheet = corruption_sheet(&pairs, 1).unwrap().unwrap();
         assert_eq!(sheet.svg.matches("<path").count(), 6);
         // Clean and two corruptions, as given and by the oracle; two clouds each.
-        let drawn = registrations(&pairs, &outcome, &["oracle", "none"]).unwrap().unwrap();
+        let drawn = registrations(&pairs, &outcome, &[Row::Oracle, Row::DCP]).unwrap().unwrap();
         assert_eq!(drawn.svg.matches("<path").count(), 3 * 2 * 2);
         assert!(drawn.svg.contains("oracle: 0.0 deg"), "exact on clean pairs");
-        assert!(registrations(&pairs, &outcome, &["none"]).unwrap().is_none());
+        assert!(registrations(&pairs, &outcome, &[Row::DCP]).unwrap().is_none());
         let curves = severity_curves(&Summary::of(&outcome).unwrap()).unwrap();
         assert_eq!(curves[0].file, "severity-rmse-r.svg");
     }

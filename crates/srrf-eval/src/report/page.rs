@@ -65,8 +65,8 @@ fn section(section: &Section) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tables::document::Figure;
-    use crate::tables::sheet::Sheet;
+    use crate::report::document::Figure;
+    use crate::report::sheet::Sheet;
 
     #[test]
     fn one_file_without_any_address_or_breakout() {

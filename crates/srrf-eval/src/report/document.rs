@@ -47,6 +47,32 @@ impl Section {
         Self { id: id.into(), title: title.into(), ..Self::default() }
     }
 
+    /// Whether it can be read without the page.
+    pub fn is_text(&self) -> bool {
+        self.html.is_empty() || !self.sheets.is_empty()
+    }
+
+    /// As Markdown, without its heading; pictures are links to their files.
+    pub fn markdown_body(&self) -> String {
+        let mut text = String::new();
+        for paragraph in &self.text {
+            text += &format!("{paragraph}\n\n");
+        }
+        for line in &self.list {
+            text += &format!("- {line}\n");
+        }
+        if !self.list.is_empty() {
+            text.push('\n');
+        }
+        for figure in &self.figures {
+            text += &format!("![{}]({})\n\n", figure.caption, figure.file);
+        }
+        for sheet in &self.sheets {
+            text += &format!("{}\n", sheet.markdown(3));
+        }
+        text
+    }
+
     /// Whether there is nothing in it.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty() && self.sheets.is_empty() && self.figures.is_empty() && self.html.is_empty()
@@ -56,29 +82,16 @@ impl Section {
 impl Document {
     /// As Markdown; pictures are links to their files.
     pub fn markdown(&self) -> String {
-        let mut text = format!("# {}\n\n", self.title);
-        for (name, value) in &self.facts {
-            text += &format!("- {name}: {value}\n");
-        }
-        for section in self.sections.iter().filter(|s| s.html.is_empty() || !s.sheets.is_empty()) {
-            text += &format!("\n## {}\n\n", section.title);
-            for paragraph in &section.text {
-                text += &format!("{paragraph}\n\n");
-            }
-            for line in &section.list {
-                text += &format!("- {line}\n");
-            }
-            if !section.list.is_empty() {
-                text.push('\n');
-            }
-            for figure in &section.figures {
-                text += &format!("![{}]({})\n\n", figure.caption, figure.file);
-            }
-            for sheet in &section.sheets {
-                text += &format!("{}\n", sheet.markdown());
-            }
+        let mut text = format!("# {}\n\n{}", self.title, self.fact_lines());
+        for section in self.sections.iter().filter(|section| section.is_text()) {
+            text += &format!("\n## {}\n\n{}", section.title, section.markdown_body());
         }
         text
+    }
+
+    /// Where the numbers come from, as a list in Markdown.
+    pub fn fact_lines(&self) -> String {
+        self.facts.iter().map(|(name, value)| format!("- {name}: {value}\n")).collect()
     }
 
     /// All tables.

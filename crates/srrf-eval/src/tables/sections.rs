@@ -5,21 +5,25 @@ use std::path::PathBuf;
 use srrf_cloud::{PointCloud, Register};
 use srrf_corrupt::Pair;
 
-use super::document::{Document, Section};
 use super::options::TablesOptions;
-use super::sheets::{self, Column};
-use super::{Evidence, Measured, Stage, chosen, figures, losses, plan, thresholds};
+use super::{Evidence, Measured, Stage, chosen, losses, plan, thresholds};
 use crate::EvalError;
+use crate::method_set::MethodSet;
 use crate::methods::MethodContext;
 use crate::pairs::PairSource;
+use crate::protocol::{MIDDLE, SynthesizedPairs};
+use crate::report::document::{Document, Figure, Section};
+use crate::report::figures;
+use crate::report::sheet::Sheet;
+use crate::report::sheets::{self, Column};
+use crate::rows::Row;
 use crate::summary::SeverityKey;
-use crate::synthesized::SynthesizedPairs;
 
 /// Rows of table 4: DCP, or what stands in for it.
-pub(super) const SAMPLED_ROWS: [&str; 4] = ["icp", "dcp", "srrf-dense", "srrf"];
+pub(super) static SAMPLED_ROWS: [Row; 4] = [Row::ICP, Row::DCP, Row::SRRF_DENSE, Row::SRRF];
 
 /// Rows of the picture of registrations.
-const DRAWN_ROWS: [&str; 3] = ["icp", "srrf", "srrf+refine"];
+const DRAWN_ROWS: [Row; 3] = [Row::ICP, Row::SRRF, Row::SRRF_REFINE];
 
 /// Puts the report together.
 pub(super) fn document(
@@ -34,6 +38,9 @@ pub(super) fn document(
         sections.push(losses_section(main));
         sections.push(main_section(main));
     }
+    if let Some(main) = evidence.parts.get("main") {
+        sections.push(probability_section(main));
+    }
     if let Some(same) = same {
         sections.push(severity_section(same)?);
     }
@@ -47,6 +54,9 @@ pub(super) fn document(
         section.text.push("The same pairs as above; the network never saw a corruption in training.".into());
         section.sheets = sheets::paper_tables(&clean.summary, "-clean-trained");
         sections.push(section);
+    }
+    if let Some(partial) = evidence.parts.get("partial") {
+        sections.push(partial_section(partial));
     }
     sections.push(sampling_section(stage, evidence)?);
     sections.push(skeleton_section(evidence, same));
@@ -73,10 +83,10 @@ fn facts(options: &TablesOptions, evidence: &Evidence) -> Vec<(String, String)> 
     }
     fact("Shapes", evidence.shapes.to_string());
     fact("Seed", options.seed.to_string());
-    for (method, weights) in &evidence.cast.weights {
+    for (method, weights) in &evidence.weights {
         fact(&format!("Weights of {method}"), weights.clone());
     }
-    for (name, reason) in evidence.cast.left_out.iter().chain(&evidence.missing) {
+    for (name, reason) in evidence.methods.left_out.iter().chain(&evidence.missing) {
         fact(&format!("Left out: {name}"), reason.clone());
     }
     // The place of the program is no part of the command.
@@ -92,10 +102,10 @@ fn facts(options: &TablesOptions, evidence: &Evidence) -> Vec<(String, String)> 
 fn seconds(evidence: &Evidence) -> f64 {
     let of = |measured: &Measured| -> f64 {
         let rows = &measured.outcome.rows;
-        let branch = |row: &String| {
-            rows.iter().any(|other| row.strip_prefix(other.as_str()).is_some_and(|r| r.starts_with('-')))
+        let whole = |row: &Row| {
+            rows.iter().any(|r| matches!((r, row), (Row::Method(a), Row::Branch(b, _)) if a == b))
         };
-        let counted: Vec<usize> = (0..rows.len()).filter(|&i| !branch(&rows[i])).collect();
+        let counted: Vec<usize> = (0..rows.len()).filter(|&i| !whole(&rows[i])).collect();
         let answers = measured.outcome.records.iter().flat_map(|r| counted.iter().map(|&i| &r.answers[i]));
         answers.filter_map(|a| a.seconds).sum()
     };
@@ -123,6 +133,23 @@ fn main_section(main: &Measured) -> Section {
     section
 }
 
+fn probability_section(main: &Measured) -> Section {
+    let mut section = Section::new("probability", "How well the product knows whether it is right");
+    section.sheets.extend(sheets::probability(&main.summary));
+    section
+}
+
+fn partial_section(partial: &Measured) -> Section {
+    let mut section = Section::new("partial", "Partial overlap");
+    section.text.push(format!("{}. As in RPMNet's partial pairs.", partial.data));
+    let title = "Clean pairs, of each of which a crop keeps 70 percent of the points";
+    section.sheets.push(sheets::plain("partial", title, "", &partial.summary));
+    section.sheets.extend(
+        sheets::probability(&partial.summary).map(|s| Sheet { key: "partial-probability".into(), ..s }),
+    );
+    section
+}
+
 fn severity_section(same: &Measured) -> Result<Section, EvalError> {
     let mut section = Section::new("severity", "Error against severity");
     section.text.push(format!("{}; the same in every column.", same.data));
@@ -143,7 +170,7 @@ fn pictures(
     let same = stage.pairs(plan::same_shapes_protocol(stage.options, stage.shapes))?;
     section.figures.extend(figures::corruption_sheet(&same, same.groups()[0].pairs / 3)?);
     section.figures.extend(figures::registrations(pairs, &main.outcome, &DRAWN_ROWS)?);
-    if evidence.cast.method("srrf").is_some() {
+    if evidence.methods.method(&Row::SRRF).is_some() {
         let shown = |count: usize| {
             let count = count.min(main.outcome.groups[0].pairs);
             let items = (0..count).map(|i| i * main.outcome.groups[0].pairs / count);
@@ -167,17 +194,17 @@ fn skeleton_picture(
     evidence: &Evidence,
     pairs: &SynthesizedPairs,
     main: &Measured,
-) -> Result<Option<super::document::Figure>, EvalError> {
-    let cast = |weights: Option<PathBuf>| -> Result<Option<super::Cast>, EvalError> {
+) -> Result<Option<Figure>, EvalError> {
+    let network = |weights: Option<PathBuf>| -> Result<Option<MethodSet>, EvalError> {
         let context = |weights| MethodContext::of_srrf(Some(weights), &stage.options.device);
-        weights.map(|weights| super::Cast::new(&["srrf".to_owned()], &context(weights))).transpose()
+        weights.map(|weights| MethodSet::of_rows(&[Row::SRRF], false, &context(weights))).transpose()
     };
-    let (with, without) = (cast(stage.options.with_loss())?, cast(stage.options.without_loss())?);
+    let (with, without) = (network(stage.options.with_loss())?, network(stage.options.without_loss())?);
     let mut networks: Vec<(&str, &dyn Register)> = Vec::new();
-    if let Some(method) = without.as_ref().and_then(|cast| cast.method("srrf")) {
+    if let Some(method) = without.as_ref().and_then(|set| set.method(&Row::SRRF)) {
         networks.push(("without the loss", &*method.register));
     }
-    let with = with.as_ref().unwrap_or(&evidence.cast).method("srrf");
+    let with = with.as_ref().unwrap_or(&evidence.methods).method(&Row::SRRF);
     let Some(method) = with else { return Ok(None) };
     networks.push(("with the loss", &*method.register));
     let mut shown: Vec<(String, Pair)> = Vec::new();
@@ -197,7 +224,7 @@ fn views(evidence: &Evidence, pairs: &SynthesizedPairs, main: &Measured) -> Resu
          symmetry) and three of the worst. Choose a pair and a pose; drag to turn."
             .into(),
     );
-    let network = evidence.cast.method("srrf").map(|m| &*m.register as &dyn Register);
+    let network = evidence.methods.method(&Row::SRRF).map(|m| &*m.register as &dyn Register);
     section.html = chosen::viewer(pairs, &main.outcome, network)?;
     Ok(section)
 }
@@ -215,8 +242,8 @@ fn sampling_section(stage: &Stage<'_>, evidence: &Evidence) -> Result<Section, E
          skeleton 1.464 / 0.888.",
         &measured.summary,
     ));
-    let row = SAMPLED_ROWS.iter().rev().find(|r| measured.outcome.rows.iter().any(|row| row == *r));
-    if let (Some(row), Some(method)) = (row, evidence.cast.method("srrf")) {
+    let row = SAMPLED_ROWS.iter().rev().find(|r| measured.outcome.rows.contains(r));
+    if let (Some(row), Some(method)) = (row, evidence.methods.method(&Row::SRRF)) {
         let pairs = stage.sampled(&*method.register)?;
         section.figures.extend(figures::sampled_registrations(&pairs, &measured.outcome, row, 0)?);
     }
@@ -227,7 +254,7 @@ fn skeleton_section(evidence: &Evidence, same: Option<&Measured>) -> Section {
     let mut section = Section::new("table5", "Table 5: skeletons");
     let of = |part: &str| evidence.parts.get(part).map(|m| &m.summary);
     if let Some(with) = of("with-loss").or(same.map(|m| &m.summary)) {
-        section.sheets.extend(sheets::skeletons(with, of("without-loss")));
+        section.sheets.extend(sheets::table5(with, of("without-loss")));
     }
     section
 }
@@ -239,7 +266,7 @@ fn ablations(evidence: &Evidence, same: Option<&Measured>) -> Section {
          the weights: its ablation needs networks trained with other numbers (`--variant`)."
             .into(),
     );
-    let middle = SeverityKey::One(plan::MIDDLE.get());
+    let middle = SeverityKey::One(MIDDLE.get());
     let compared = [
         (
             "one-sided",

@@ -1,9 +1,11 @@
 //! Pairs made from shapes: clean ones, and each corruption at each severity.
 
 use serde::Serialize;
+use srrf_cloud::{CloudError, PointCloud};
+use srrf_corrupt::crop::{crop, random_direction};
 use srrf_corrupt::datasets::ShapeSource;
 use srrf_corrupt::{
-    CorruptionKind, Mixture, Normalize, PairConfig, PairSynthesizer, PoseDraw, Purpose, RotationRange,
+    CorruptionKind, Mixture, Normalize, Pair, PairConfig, PairSynthesizer, PoseDraw, Purpose, RotationRange,
     Sampling, Severity, Stream,
 };
 
@@ -12,6 +14,9 @@ use crate::pairs::{EvalPair, Group, PairSource};
 
 /// Name of the group of pairs without corruption.
 pub const CLEAN: &str = "clean";
+
+/// The severity of the ablations.
+pub(crate) const MIDDLE: Severity = Severity::ALL[2];
 
 /// Which pairs are made.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,11 +35,32 @@ pub struct Protocol {
     pub seed: u64,
     /// How a pair is made.
     pub pair: PairConfig,
+    /// Share of each cloud that a crop keeps, in (0, 1], after the corruption: the points farthest along a random direction, another
+    /// one for each cloud (RPMNet's partial pairs keep 0.7).
+    pub crop: Option<f64>,
     /// Whether shape `i` has the pose of item `i` of DCP's test set instead of a seeded one.
     pub dcp_poses: bool,
     /// Whether each shape is shown at one severity only, the severities in turn, so that as many shapes
     /// cost a fraction of the time.
     pub spread: bool,
+}
+
+impl Default for Protocol {
+    /// What the program scores without options: 20 shapes, clean and with every corruption at every severity.
+    fn default() -> Self {
+        Self {
+            clean: true,
+            corruptions: CorruptionKind::ALL.to_vec(),
+            mixtures: Vec::new(),
+            severities: Severity::ALL.to_vec(),
+            shapes: 20,
+            seed: 1,
+            pair: PairConfig::default(),
+            crop: None,
+            dcp_poses: false,
+            spread: false,
+        }
+    }
 }
 
 /// Pairs made on demand. Pair `item` is derived from the seed and the number of its shape alone, so
@@ -95,6 +121,9 @@ impl SynthesizedPairs {
     pub fn new(source: Box<dyn ShapeSource>, protocol: Protocol) -> Result<Self, EvalError> {
         let synthesizer = PairSynthesizer::new(protocol.pair)
             .map_err(|e| EvalError::Usage(format!("pairs cannot be made so: {e}")))?;
+        if protocol.crop.is_some_and(|keep| !(keep > 0.0 && keep <= 1.0)) {
+            return Err(EvalError::Usage("--crop: the share that is kept is above 0 and at most 1".into()));
+        }
         let count = protocol.shapes.min(source.len());
         let shapes: Vec<usize> = (0..count).map(|i| i * source.len() / count).collect();
         let clean = protocol.clean.then_some(Condition::Clean);
@@ -164,7 +193,7 @@ impl PairSource for SynthesizedPairs {
             RotationRange::So3 => format!("all rotations, translation within {}", pair.translation),
         };
         format!(
-            "{}; {} shapes scored{}; corrupt {}, sampling {}, normalize {}, {} points; {poses}",
+            "{}; {} shapes scored{}; corrupt {}, sampling {}, normalize {}, {} points{}; {poses}",
             self.source.description(),
             self.shapes.len(),
             if self.protocol.spread { ", each at one severity" } else { "" },
@@ -172,6 +201,7 @@ impl PairSource for SynthesizedPairs {
             word(pair.sampling),
             word(pair.normalize),
             pair.points,
+            self.protocol.crop.map_or(String::new(), |keep| format!(", {keep} of each kept by a crop")),
         )
     }
 
@@ -204,9 +234,28 @@ impl PairSource for SynthesizedPairs {
             item,
             problem: e.to_string(),
         };
-        let pair = pair.map_err(named)?;
+        let mut pair = pair.map_err(named)?;
+        if let Some(keep) = self.protocol.crop {
+            crop_pair(&mut pair, keep, stream).map_err(|source| {
+                named(srrf_corrupt::PairError::Cloud { id: self.source.id(shape), source })
+            })?;
+        }
         Ok(EvalPair { pair, clean: self.clean(shape, stream)? })
     }
+}
+
+/// Keeps the `keep` share of each cloud that lies farthest along a direction of its own.
+fn crop_pair(pair: &mut Pair, keep: f64, stream: Stream) -> Result<(), CloudError> {
+    let mut rng = stream.rng(Purpose::Crop);
+    let clouds = [(&mut pair.source, &mut pair.source_origin), (&mut pair.target, &mut pair.target_origin)];
+    for (cloud, origin) in clouds {
+        let kept = crop(cloud.points(), &random_direction(&mut rng), keep);
+        *cloud = PointCloud::new(kept.iter().map(|&i| cloud.points()[i]).collect())?;
+        if let Some(origin) = origin {
+            *origin = kept.iter().map(|&i| origin[i]).collect();
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -225,6 +274,7 @@ mod tests {
             shapes: 3,
             seed: 7,
             pair: PairConfig { points: 65, ..PairConfig::default() },
+            crop: None,
             dcp_poses: false,
             spread: false,
         }
@@ -287,6 +337,24 @@ mod tests {
             ..protocol()
         };
         assert_eq!(pairs(boxed).pair(2, 1).unwrap().clean, None);
+    }
+
+    #[test]
+    fn a_crop_keeps_a_share_of_each_cloud_and_what_corresponds() {
+        let cropped = pairs(Protocol { crop: Some(0.7), ..protocol() });
+        assert!(cropped.description().contains("0.7 of each kept"));
+        let (part, whole) = (cropped.pair(0, 1).unwrap().pair, pairs(protocol()).pair(0, 1).unwrap().pair);
+        assert_eq!((part.source.len(), part.target.len()), (46, 46), "of 65");
+        assert_eq!(part.target_from_source, whole.target_from_source);
+        assert!(part.source.points().iter().all(|p| whole.source.points().contains(p)));
+        let found = srrf_corrupt::oracle_pose(&part).unwrap();
+        assert!(found.angle_to_deg(&part.target_from_source) < 1e-6, "correspondences were cropped along");
+        // Another part of each: fewer points correspond than each cloud has.
+        let origins = part.source_origin.unwrap();
+        let shared = part.target_origin.unwrap().into_iter().filter(|o| origins.contains(o)).count();
+        assert!(shared < 46);
+        let nothing = Protocol { crop: Some(0.0), ..protocol() };
+        assert!(SynthesizedPairs::new(data::procedural(3).unwrap(), nothing).is_err());
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use crate::metrics::Scores;
+use crate::rows::Row;
 
 /// The rows of the paper's tables 1 to 4 as they are printed.
 const TEXT: &str = include_str!("../../data/paper.csv");
@@ -11,8 +12,16 @@ const TEXT: &str = include_str!("../../data/paper.csv");
 /// distance loss, in a unit that it does not say.
 pub(crate) const SKELETON_CHAMFER: [f64; 2] = [3.85, 1.83];
 
-/// Methods of tables 1 to 3, under our names, in the paper's order.
-pub(crate) const METHODS: [&str; 7] = ["icp", "pointnetlk", "dcp", "rgm", "panet", "equi-gspr", "srrf"];
+/// Methods of tables 1 to 3, as our rows, in the paper's order.
+pub(crate) static METHODS: [Row; 7] = [
+    Row::ICP,
+    Row::method("pointnetlk"),
+    Row::DCP,
+    Row::RGM,
+    Row::method("panet"),
+    Row::method("equi-gspr"),
+    Row::SRRF,
+];
 
 /// A row of one of the tables 1 to 4.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,8 +30,8 @@ pub(crate) struct PaperRow {
     pub table: u8,
     /// Our name of the corruption; in table 4 the paper's name of the sampling.
     pub corruption: &'static str,
-    /// Our name of the method.
-    pub method: &'static str,
+    /// Our row of the method.
+    pub method: Row,
     /// MSE, RMSE and MAE of the rotation in degrees, then of the translation.
     pub values: [f64; 6],
 }
@@ -37,12 +46,13 @@ fn row(line: &'static str) -> Option<PaperRow> {
     let cells: Vec<&'static str> = line.split(',').collect();
     let (&[table, corruption, method], numbers) = cells.split_first_chunk::<3>()?;
     let numbers: Vec<f64> = numbers.iter().map(|n| n.parse().ok()).collect::<Option<_>>()?;
+    let method = Row::method(method);
     Some(PaperRow { table: table.parse().ok()?, corruption, method, values: numbers.try_into().ok()? })
 }
 
 /// The paper's numbers for a corruption and a method, if it has them.
-pub(crate) fn find(corruption: &str, method: &str) -> Option<&'static PaperRow> {
-    rows().iter().find(|r| r.corruption == corruption && r.method == method)
+pub(crate) fn find(corruption: &str, method: &Row) -> Option<&'static PaperRow> {
+    rows().iter().find(|r| r.corruption == corruption && r.method == *method)
 }
 
 /// Our values in the order of [`PaperRow::values`].
@@ -75,7 +85,7 @@ mod tests {
         for row in rows() {
             for (at, slack) in [(0, 2e-6), (3, 1e-3)] {
                 let (mse, rmse) = (row.values[at], row.values[at + 1]);
-                let wrong_in_the_paper = row.corruption == "gaussian" && row.method == "icp" && at == 3;
+                let wrong_in_the_paper = row.corruption == "gaussian" && row.method == Row::ICP && at == 3;
                 assert_eq!((mse.sqrt() - rmse).abs() > slack, wrong_in_the_paper, "{row:?}");
             }
         }

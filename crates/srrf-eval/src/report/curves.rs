@@ -3,7 +3,9 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
+use crate::protocol::CLEAN;
 use crate::quantities::Quantity;
+use crate::rows::Row;
 use crate::summary::{SeverityKey, Summary};
 
 /// Colours that people with any colour vision can tell apart (Okabe and Ito 2008).
@@ -44,10 +46,10 @@ pub(crate) fn svg(quantity: &Quantity, summary: &Summary) -> Result<Option<Strin
     let width = (PANEL.0 * columns as u32).max(560);
     let size = (width, LEGEND_HEIGHT + PANEL.1 * rows as u32);
 
-    let clean = summary.corruptions().contains(&"clean");
+    let clean = summary.corruptions().contains(&CLEAN);
     let first = if clean { 0 } else { severities[0] };
-    let curve = |corruption: &str, method: &str| -> Vec<(f64, f64)> {
-        let clean = clean.then_some(("clean", 0));
+    let curve = |corruption: &str, method: &Row| -> Vec<(f64, f64)> {
+        let clean = clean.then_some((CLEAN, 0));
         let points = clean.into_iter().chain(severities.iter().map(|&s| (corruption, s)));
         points
             .filter_map(|(corruption, severity)| {
@@ -81,7 +83,7 @@ pub(crate) fn svg(quantity: &Quantity, summary: &Summary) -> Result<Option<Strin
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-fn draw_legend(area: &Area<'_>, title: &str, methods: &[&str]) -> Drawn {
+fn draw_legend(area: &Area<'_>, title: &str, methods: &[&Row]) -> Drawn {
     let text = |size: i32| ("sans-serif", size).into_font().color(&BLACK);
     area.draw(&Text::new(title.to_owned(), (12, 8), text(16)))?;
     let mut x = 12;
@@ -89,8 +91,8 @@ fn draw_legend(area: &Area<'_>, title: &str, methods: &[&str]) -> Drawn {
         let colour = COLOURS[index % COLOURS.len()];
         area.draw(&PathElement::new(vec![(x, 40), (x + 18, 40)], colour.stroke_width(2)))?;
         area.draw(&Circle::new((x + 9, 40), 3, colour.filled()))?;
-        area.draw(&Text::new((*method).to_owned(), (x + 23, 34), text(13)))?;
-        x += 36 + 7 * method.chars().count() as i32;
+        area.draw(&Text::new(method.to_string(), (x + 23, 34), text(13)))?;
+        x += 36 + 7 * method.to_string().chars().count() as i32;
     }
     Ok(())
 }

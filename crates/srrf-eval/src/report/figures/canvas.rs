@@ -65,7 +65,7 @@ impl Grid {
     pub fn panel(&mut self, column: usize, row: usize, title: &str) {
         self.origin = [SIDE * column as f64, (SIDE + LINE) * row as f64];
         let [x, y] = self.origin;
-        let title = super::super::sheet::escape(title);
+        let title = crate::report::sheet::escape(title);
         // Writing to a String cannot fail; so below.
         let _ = write!(self.body, "<text x=\"{:.0}\" y=\"{:.0}\">{title}</text>", x + 4.0, y + 12.0);
     }

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use zip::CompressionMethod;
 use zip::write::{SimpleFileOptions, StreamWriter};
 
-use crate::arrays::Array;
+use super::npy::Array;
 
 /// Writes a `.npz` file array by array; the same arrays give the same bytes.
 pub struct NpzWriter<W: Write> {
@@ -33,7 +33,7 @@ impl<W: Write> NpzWriter<W> {
             .large_file(values.len() > (u32::MAX / 16) as usize);
         self.zip.start_file(format!("{name}.npy"), options)?;
         let mut buffered = BufWriter::new(&mut self.zip);
-        Array::write(&mut buffered, shape, values)?;
+        Array::write(shape, values, &mut buffered)?;
         buffered.flush()?;
         drop(buffered);
         self.error.take().map_or(Ok(()), Err)
@@ -95,7 +95,7 @@ impl<W: Write> Write for Fallible<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arrays::read_npz;
+    use crate::io::read_npz;
 
     #[test]
     fn archives_have_stable_bytes() {

@@ -7,29 +7,35 @@ use serde::Serialize;
 use srrf_cloud::io::write_atomically;
 
 use super::document::Document;
-use super::options::TablesOptions;
-use super::{Evidence, page};
+use super::page;
 use crate::EvalError;
 use crate::summary::Summary;
 
-/// Writes the report, file by file under temporary names, and gives their names.
+/// What was scored in one part of the report.
+#[derive(Serialize)]
+pub(crate) struct Part<'a> {
+    /// Name of the part, or of the network of a variant.
+    pub part: &'a str,
+    /// The data, and how the pairs were made.
+    pub data: &'a str,
+    /// Its scores.
+    pub summary: &'a Summary,
+}
+
+/// Writes the report to the folder `out`, file by file under temporary names, and gives their names.
 ///
 /// # Errors
 /// [`EvalError::Output`] names the file that cannot be written.
-pub(super) fn all(
-    options: &TablesOptions,
-    document: &Document,
-    evidence: &Evidence,
-) -> Result<Vec<String>, EvalError> {
+pub(crate) fn all(out: &Path, document: &Document, parts: &[Part<'_>]) -> Result<Vec<String>, EvalError> {
     let mut names = Vec::new();
     let mut put = |name: String, content: &str| {
-        write(&options.out, &name, content)?;
+        file(out, &name, content)?;
         names.push(name);
         Ok::<_, EvalError>(())
     };
     put("report.html".into(), &page::html(document))?;
     put("tables.md".into(), &document.markdown())?;
-    put("results.json".into(), &json(document, evidence)?)?;
+    put("results.json".into(), &json(document, parts)?)?;
     for sheet in document.sheets() {
         put(format!("{}.csv", sheet.key), &sheet.csv())?;
     }
@@ -39,32 +45,23 @@ pub(super) fn all(
     Ok(names)
 }
 
-fn write(out: &Path, name: &str, content: &str) -> Result<(), EvalError> {
+/// Writes one file, whole or not at all.
+///
+/// # Errors
+/// [`EvalError::Output`] names it.
+pub(crate) fn file(out: &Path, name: &str, content: &str) -> Result<(), EvalError> {
     let path = out.join(name);
     write_atomically(&path, |file| file.write_all(content.as_bytes()))
         .map_err(|source| EvalError::Output { path, source })
 }
 
 /// All summaries, with where they come from.
-fn json(document: &Document, evidence: &Evidence) -> Result<String, EvalError> {
-    #[derive(Serialize)]
-    struct Part<'a> {
-        part: &'a str,
-        data: &'a str,
-        summary: &'a Summary,
-    }
+fn json(document: &Document, parts: &[Part<'_>]) -> Result<String, EvalError> {
     #[derive(Serialize)]
     struct Results<'a> {
         facts: &'a [(String, String)],
-        parts: Vec<Part<'a>>,
+        parts: &'a [Part<'a>],
     }
-    let parts = evidence
-        .parts
-        .iter()
-        .map(|(part, measured)| (*part, measured))
-        .chain(evidence.variants.iter().map(|(name, measured)| (name.as_str(), measured)))
-        .map(|(part, measured)| Part { part, data: &measured.data, summary: &measured.summary })
-        .collect();
     let results = Results { facts: &document.facts, parts };
     serde_json::to_string(&results)
         .map(|text| text + "\n")

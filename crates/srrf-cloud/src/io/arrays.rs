@@ -1,0 +1,99 @@
+//! Arrays of any shape in NumPy's `.npy` and `.npz` files.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, BufReader};
+use std::path::{Path, PathBuf};
+
+use super::npy::Array;
+use super::{FormatError, npz};
+
+/// Why a NumPy file cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum ArrayError {
+    /// The file cannot be opened, read or written.
+    #[error("{path:?}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+    /// The file is not an archive of arrays.
+    #[error("{path:?} is not an .npz archive, or is damaged ({source}); write it with numpy.savez")]
+    Archive {
+        /// The file.
+        path: PathBuf,
+        /// The reader's reason.
+        source: zip::result::ZipError,
+    },
+    /// An array cannot be read.
+    #[error("{path:?}, array {array}: {source}")]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// Name of the array.
+        array: String,
+        /// What is wrong with it.
+        source: FormatError,
+    },
+    /// An array cannot be used for what it is to be.
+    #[error("{path:?}, array {array}: {problem}")]
+    Array {
+        /// The file.
+        path: PathBuf,
+        /// Name of the array.
+        array: String,
+        /// What is wrong, and what is expected.
+        problem: String,
+    },
+}
+
+/// Reads a `.npy` file.
+///
+/// # Errors
+/// [`ArrayError`] with the file and what is wrong with it.
+pub fn read_npy(path: &Path) -> Result<Array, ArrayError> {
+    let bytes = fs::read(path).map_err(|source| ArrayError::Io { path: path.to_owned(), source })?;
+    Array::parse(&bytes).map_err(|source| ArrayError::Format {
+        path: path.to_owned(),
+        array: "(the only one)".into(),
+        source,
+    })
+}
+
+/// The arrays of a `.npz` file.
+#[derive(Debug, Clone, Default)]
+pub struct NpzArrays {
+    /// Names in the order of the file.
+    pub names: Vec<String>,
+    /// The arrays by name.
+    pub arrays: BTreeMap<String, Array>,
+}
+
+/// Reads all arrays of a `.npz` file.
+///
+/// # Errors
+/// [`ArrayError`] with the file, the array and what is wrong with it.
+pub fn read_npz(path: &Path) -> Result<NpzArrays, ArrayError> {
+    let file = File::open(path).map_err(|source| ArrayError::Io { path: path.to_owned(), source })?;
+    let size = file.metadata().map_err(|source| ArrayError::Io { path: path.to_owned(), source })?.len();
+    let archive = |source| ArrayError::Archive { path: path.to_owned(), source };
+    let mut zip = zip::ZipArchive::new(BufReader::new(file)).map_err(archive)?;
+    let mut npz = NpzArrays::default();
+    for index in 0..zip.len() {
+        let mut entry = zip.by_index(index).map_err(archive)?;
+        let Some(name) = entry.name().map_err(archive)?.strip_suffix(".npy").map(str::to_owned) else {
+            continue;
+        };
+        let bytes = npz::unpack(&mut entry, size).and_then(|bytes| Array::parse(&bytes));
+        let array = bytes.map_err(|source| ArrayError::Format {
+            path: path.to_owned(),
+            array: name.clone(),
+            source,
+        })?;
+        npz.names.push(name.clone());
+        npz.arrays.insert(name, array);
+    }
+    Ok(npz)
+}
