@@ -23,12 +23,12 @@ pub struct FpfhCloud<'a> {
     cloud: Cow<'a, PointCloud>,
     spacing: f64,
     counts: Memo<u64, usize>,
-    levels: Memo<u64, Level>,
+    levels: Memo<u64, ThinCloud>,
 }
 
 /// A cloud thinned by voxels of one size.
 #[derive(Debug)]
-pub(crate) struct Level {
+pub(crate) struct ThinCloud {
     /// Shape `[n, 3]`.
     pub points: Vec<[f64; 3]>,
     oriented: Memo<(), Oriented>,
@@ -74,9 +74,9 @@ impl<'a> FpfhCloud<'a> {
     }
 
     /// The cloud thinned by voxels of side `voxel`; `None` where more than `most` points are left.
-    pub(crate) fn thinned(&self, voxel: f64, most: usize) -> Result<Option<Arc<Level>>, VoxelError> {
+    pub(crate) fn thinned(&self, voxel: f64, most: usize) -> Result<Option<Arc<ThinCloud>>, VoxelError> {
         let key = voxel.to_bits();
-        let fits = |level: Arc<Level>| (level.points.len() <= most).then_some(level);
+        let fits = |level: Arc<ThinCloud>| (level.points.len() <= most).then_some(level);
         if let Some(level) = self.levels.find(&key) {
             return Ok(fits(level));
         }
@@ -88,12 +88,12 @@ impl<'a> FpfhCloud<'a> {
             self.counts.keep(key, points.len());
             return Ok(None);
         }
-        let level = Level { points, oriented: Memo::new(1), described: Memo::new(KEPT_RADII) };
+        let level = ThinCloud { points, oriented: Memo::new(1), described: Memo::new(KEPT_RADII) };
         Ok(fits(self.levels.keep(key, level)))
     }
 }
 
-impl Level {
+impl ThinCloud {
     /// The descriptors within `radius`, one a point.
     ///
     /// # Errors

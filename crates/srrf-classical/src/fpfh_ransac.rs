@@ -6,7 +6,7 @@ use srrf_refine::{Deformed, RefineConfig, RefineTarget};
 
 use crate::correspond::correspond;
 use crate::fpfh_cloud::FpfhCloud;
-use crate::ransac::{Search, ransac};
+use crate::ransac::{ConsensusSearch, ransac};
 
 /// Settings of [`FpfhRansac`]. Lengths are in voxels, and the voxel follows from the clouds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -76,7 +76,7 @@ impl FpfhRansac {
     ) -> Result<Hypotheses, RegisterError> {
         let config = &self.config;
         let matches = correspond(source, target, config.points, config.feature_voxels, 30)?;
-        let search = Search {
+        let search = ConsensusSearch {
             max_iterations: config.max_iterations,
             confidence: config.confidence,
             edge_similarity: config.edge_similarity,

@@ -14,7 +14,7 @@ const BATCHES_A_ROUND: usize = 16;
 
 /// How to search.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Search {
+pub(crate) struct ConsensusSearch {
     pub max_iterations: usize,
     pub confidence: f64,
     pub edge_similarity: f64,
@@ -45,7 +45,7 @@ impl Hypothesis {
 /// A sample is three matches. It is dropped if an edge differs in length between the clouds by more than
 /// `edge_similarity` allows, or if its own fit leaves one of the three beyond `distance` (both as in
 /// Open3D). The search ends when a better consensus would have been found with probability `confidence`.
-pub(crate) fn ransac(matches: &Correspondences, search: &Search) -> (Vec<Hypothesis>, usize) {
+pub(crate) fn ransac(matches: &Correspondences, search: &ConsensusSearch) -> (Vec<Hypothesis>, usize) {
     let pairs: Vec<([f64; 3], [f64; 3])> = matches
         .pairs
         .iter()
@@ -84,7 +84,7 @@ pub(crate) fn ransac(matches: &Correspondences, search: &Search) -> (Vec<Hypothe
     (best, drawn)
 }
 
-fn run_batch(pairs: &[([f64; 3], [f64; 3])], search: &Search, batch: u64) -> Vec<Hypothesis> {
+fn run_batch(pairs: &[([f64; 3], [f64; 3])], search: &ConsensusSearch, batch: u64) -> Vec<Hypothesis> {
     let mut rng = ChaCha8Rng::seed_from_u64(search.seed);
     rng.set_stream(batch);
     let mut best = Vec::new();
@@ -97,7 +97,7 @@ fn run_batch(pairs: &[([f64; 3], [f64; 3])], search: &Search, batch: u64) -> Vec
     best
 }
 
-fn fit_sample(pairs: &[([f64; 3], [f64; 3])], sample: [usize; 3], search: &Search) -> Option<Rigid> {
+fn fit_sample(pairs: &[([f64; 3], [f64; 3])], sample: [usize; 3], search: &ConsensusSearch) -> Option<Rigid> {
     let [a, b, c] = sample;
     for (i, j) in [(a, b), (b, c), (c, a)] {
         let (in_source, in_target) = (squared(&pairs[i].0, &pairs[j].0), squared(&pairs[i].1, &pairs[j].1));
@@ -142,7 +142,7 @@ fn polish(pairs: &[([f64; 3], [f64; 3])], mut best: Hypothesis, distance: f64) -
 }
 
 /// Keeps the best hypotheses that differ by 10 degrees or 10 thresholds.
-fn insert(best: &mut Vec<Hypothesis>, new: Hypothesis, search: &Search) {
+fn insert(best: &mut Vec<Hypothesis>, new: Hypothesis, search: &ConsensusSearch) {
     let alike = |a: &Hypothesis| {
         a.pose.angle_to_deg(&new.pose) < 10.0
             && (a.pose.translation - new.pose.translation).norm() < 10.0 * search.distance
@@ -182,8 +182,8 @@ mod tests {
         Correspondences { source, target, voxel: 0.05, pairs }
     }
 
-    fn search(seed: u64) -> Search {
-        Search {
+    fn search(seed: u64) -> ConsensusSearch {
+        ConsensusSearch {
             max_iterations: 100_000,
             confidence: 0.999,
             edge_similarity: 0.9,

@@ -10,7 +10,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 static ON: AtomicBool = AtomicBool::new(false);
-static TIMES: Mutex<Vec<StageTime>> = Mutex::new(Vec::new());
+static TIMES: Mutex<Vec<StageTotal>> = Mutex::new(Vec::new());
 
 thread_local! {
     /// Stages that this thread is in, the outermost first.
@@ -19,7 +19,7 @@ thread_local! {
 
 /// The time of one stage.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct StageTime {
+pub struct StageTotal {
     /// Names of the stages around it, the outermost first, and its own.
     pub path: Vec<&'static str>,
     /// How often it ran to its end.
@@ -63,7 +63,7 @@ fn enter(name: &'static str) -> usize {
         if let Some(place) = times.iter().position(|entry| entry.path == *path) {
             return place;
         }
-        times.push(StageTime { path: path.clone(), calls: 0, time: Duration::ZERO });
+        times.push(StageTotal { path: path.clone(), calls: 0, time: Duration::ZERO });
         times.len() - 1
     })
 }
@@ -75,7 +75,7 @@ pub fn report() -> Report {
 
 /// Times of all stages, to be printed.
 #[derive(Debug, Clone)]
-pub struct Report(pub Vec<StageTime>);
+pub struct Report(pub Vec<StageTotal>);
 
 impl Report {
     /// Writes the stages inside `parent` in the order of their first call, each followed by its own.

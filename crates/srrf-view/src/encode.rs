@@ -5,68 +5,14 @@
 //! nothing on their way to the graphics card's single precision.
 
 use nalgebra::Vector3;
-use serde::Serialize;
-use srrf_cloud::{PointCloud, Rigid, Skeleton, SoftMatch};
+use srrf_cloud::{PairFrame, PointCloud, Rigid, Skeleton, SoftMatch};
 
 use crate::describe::describe;
-use crate::quantise::{QuantisedPoints, QuantisedValues, quantise_points, quantise_values};
-use crate::residual::{Distances, ResidualSummary, Residuals};
+use crate::encoded::{EncodedCloud, EncodedMatch, EncodedPair, EncodedPose, EncodedSkeleton};
+use crate::quantise::{quantise_points, quantise_values};
+use crate::residual::{Distances, Residuals};
 use crate::sample::even_indices;
-use crate::{MATCHES_PER_PAIR, Number, PAGE_BYTES, POINTS_PER_CLOUD, Pair, Pose, Up};
-
-#[derive(Debug, Serialize)]
-pub(crate) struct EncodedPair {
-    pub name: String,
-    pub unit: String,
-    pub up: &'static str,
-    pub source: EncodedCloud,
-    pub target: EncodedCloud,
-    pub before: EncodedPose,
-    pub poses: Vec<EncodedPose>,
-    pub skeletons: Option<[EncodedSkeleton; 2]>,
-    pub matches: Vec<EncodedMatch>,
-    pub match_count: usize,
-    /// Distances of this and more are given as this.
-    pub distance_limit: Option<f64>,
-    pub numbers: Vec<Number>,
-    pub warnings: Vec<String>,
-    pub description: String,
-}
-
-#[derive(Debug, Serialize)]
-pub(crate) struct EncodedCloud {
-    /// Points of the cloud; `shown` of them are in `points`.
-    pub count: usize,
-    pub shown: usize,
-    #[serde(flatten)]
-    pub points: QuantisedPoints,
-}
-
-#[derive(Debug, Serialize)]
-pub(crate) struct EncodedPose {
-    pub name: String,
-    /// From the source's local frame to the view's, 3 rows of 4.
-    pub matrix: [f64; 12],
-    /// Angle and length of the motion from the pose before, the latter of the centre of the source.
-    pub turn_deg: f64,
-    pub shift: f64,
-    pub residual: Option<QuantisedValues>,
-    pub summary: Option<ResidualSummary>,
-    pub numbers: Vec<Number>,
-}
-
-#[derive(Debug, Serialize)]
-pub(crate) struct EncodedSkeleton {
-    pub points: Vec<[f32; 3]>,
-    pub radii: Vec<f32>,
-}
-
-#[derive(Debug, Serialize)]
-pub(crate) struct EncodedMatch {
-    pub source: [f32; 3],
-    pub target: [f32; 3],
-    pub weight: f32,
-}
+use crate::{MATCHES_PER_PAIR, PAGE_BYTES, POINTS_PER_CLOUD, Pair, Pose, Up};
 
 /// Encodes one of the `pairs` pairs of a page.
 pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
@@ -75,7 +21,8 @@ pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
     let (source, drawn) = encode_cloud(pair.source, source_budget);
     let (target, _) = encode_cloud(pair.target, target_budget);
     let distances = Distances::new(pair.target).ok();
-    let frames = Frames { source: source.points.centre, target: target.points.centre };
+    let source_centre = source.points.centre;
+    let frame = PairFrame::about(source_centre.into(), target.points.centre.into());
 
     let mut before = pair.before.clone();
     if !is_finite(&before.target_from_source) {
@@ -84,10 +31,10 @@ pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
     }
     let encode_pose = |pose: &Pose| {
         let residuals = distances.as_ref().map(|d| Residuals::new(d, &drawn, &pose.target_from_source));
-        let centre = |p: &Pose| Vector3::from(p.target_from_source.apply(&frames.source));
+        let centre = |p: &Pose| Vector3::from(p.target_from_source.apply(&source_centre));
         EncodedPose {
             name: pose.name.clone(),
-            matrix: frames.matrix(&pose.target_from_source),
+            matrix: rows_of_4(&frame.pose(&pose.target_from_source)),
             turn_deg: pose.target_from_source.angle_to_deg(&before.target_from_source),
             shift: (centre(pose) - centre(&before)).norm(),
             residual: residuals.as_ref().map(|r| quantise_values(&r.values)),
@@ -105,8 +52,8 @@ pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
     }
     let skeletons = pair.skeletons.as_ref().map(|[s, t]| {
         [
-            encode_skeleton("source", s, &frames.source, &mut warnings),
-            encode_skeleton("target", t, &frames.target, &mut warnings),
+            encode_skeleton("source", s, |p| frame.source(p), &mut warnings),
+            encode_skeleton("target", t, |p| frame.target(p), &mut warnings),
         ]
     });
     let mut encoded = EncodedPair {
@@ -119,7 +66,7 @@ pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
         before: encode_pose(&before),
         poses,
         skeletons,
-        matches: encode_matches(&pair.matches, &frames),
+        matches: encode_matches(&pair.matches, &frame),
         match_count: pair.matches.len(),
         distance_limit: distances.as_ref().and_then(Distances::limit),
         numbers: pair.numbers.clone(),
@@ -148,27 +95,18 @@ fn encode_cloud(cloud: &PointCloud, budget: usize) -> (EncodedCloud, Vec<[f64; 3
     (EncodedCloud { count: cloud.len(), shown: drawn.len(), points }, drawn)
 }
 
-/// The origins of the local frames, in the coordinates of the clouds.
-struct Frames {
-    source: [f64; 3],
-    target: [f64; 3],
-}
-
-impl Frames {
-    /// `R (p + source) + t - target`, as 3 rows of 4.
-    fn matrix(&self, pose: &Rigid) -> [f64; 12] {
-        let shift = Vector3::from(pose.apply(&self.source)) - Vector3::from(self.target);
-        std::array::from_fn(|i| match i % 4 {
-            3 => shift[i / 4],
-            column => pose.rotation[(i / 4, column)],
-        })
-    }
+/// The pose as 3 rows of 4.
+fn rows_of_4(pose: &Rigid) -> [f64; 12] {
+    std::array::from_fn(|i| match i % 4 {
+        3 => pose.translation[i / 4],
+        column => pose.rotation[(i / 4, column)],
+    })
 }
 
 fn encode_skeleton(
     which: &str,
     skeleton: &Skeleton,
-    centre: &[f64; 3],
+    local: impl Fn(&[f64; 3]) -> [f64; 3],
     warnings: &mut Vec<String>,
 ) -> EncodedSkeleton {
     let (points, radii) = (&skeleton.points, &skeleton.radii);
@@ -181,28 +119,28 @@ fn encode_skeleton(
         return EncodedSkeleton { points: Vec::new(), radii: Vec::new() };
     }
     EncodedSkeleton {
-        points: points.iter().map(|p| local(p, centre)).collect(),
+        points: points.iter().map(|p| single(local(p))).collect(),
         radii: radii.iter().map(|&r| r as f32).collect(),
     }
 }
 
 /// The strongest finite matches, strongest first; of equals those that came first.
-fn encode_matches(matches: &[SoftMatch], frames: &Frames) -> Vec<EncodedMatch> {
+fn encode_matches(matches: &[SoftMatch], frame: &PairFrame) -> Vec<EncodedMatch> {
     let finite =
         |m: &&SoftMatch| m.source.iter().chain(&m.target).chain([&m.weight]).all(|value| value.is_finite());
     let mut strongest: Vec<&SoftMatch> = matches.iter().filter(finite).collect();
     strongest.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     strongest.truncate(MATCHES_PER_PAIR);
     let encoded = strongest.into_iter().map(|m| EncodedMatch {
-        source: local(&m.source, &frames.source),
-        target: local(&m.target, &frames.target),
+        source: single(frame.source(&m.source)),
+        target: single(frame.target(&m.target)),
         weight: m.weight as f32,
     });
     encoded.collect()
 }
 
-fn local(point: &[f64; 3], centre: &[f64; 3]) -> [f32; 3] {
-    std::array::from_fn(|axis| (point[axis] - centre[axis]) as f32)
+fn single(point: [f64; 3]) -> [f32; 3] {
+    point.map(|v| v as f32)
 }
 
 fn is_finite(pose: &Rigid) -> bool {

@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use crate::Pair;
-use crate::encode::{EncodedPair, encode};
+use crate::encode::encode;
+use crate::encoded::EncodedPair;
 
 #[derive(Serialize)]
 struct ViewerData {

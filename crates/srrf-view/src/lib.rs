@@ -36,6 +36,7 @@
 mod bundle;
 mod describe;
 mod encode;
+mod encoded;
 mod html;
 mod number;
 mod page;

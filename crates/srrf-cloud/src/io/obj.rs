@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::scan::{Line, Lines, Splice, moved, number, quote, turned, write_rows};
+use super::scan::{ByteLines, Line, Splice, moved, number, quote, turned, write_rows};
 use super::{CloudFormat, FormatError};
 use crate::Rigid;
 
@@ -64,14 +64,14 @@ impl CloudFormat for Obj {
 
     fn recognises(&self, bytes: &[u8]) -> bool {
         let first =
-            Lines::new(bytes).find_map(|line| line.words().next().filter(|(_, word)| word[0] != b'#'));
+            ByteLines::new(bytes).find_map(|line| line.words().next().filter(|(_, word)| word[0] != b'#'));
         first.is_some_and(|(_, word)| WORDS.iter().any(|known| known.as_bytes() == word))
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
         let mut points = Vec::new();
         let mut last_face: Option<(usize, u64)> = None;
-        for line in Lines::new(bytes) {
+        for line in ByteLines::new(bytes) {
             let mut words = line.words();
             let Some((_, word)) = words.next() else { continue };
             match word {
@@ -115,7 +115,7 @@ impl CloudFormat for Obj {
     fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
         self.read(bytes)?;
         let mut splice = Splice::new(bytes, out);
-        for line in Lines::new(bytes) {
+        for line in ByteLines::new(bytes) {
             let turn = match line.words().next() {
                 Some((_, b"v")) => moved,
                 Some((_, b"vn")) => turned,

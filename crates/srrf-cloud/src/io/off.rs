@@ -3,13 +3,13 @@
 use std::io::{self, Write};
 use std::ops::Range;
 
-use super::scan::{Line, Lines, Splice, moved, number, turned, words, write_rows};
+use super::scan::{ByteLines, Line, Splice, moved, number, turned, words, write_rows};
 use super::{CloudFormat, FormatError};
 use crate::Rigid;
 
 /// A mesh: vertices `[n, 3]`, and triangles as indices of vertices.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Mesh {
+pub struct OffMesh {
     /// Shape `[n, 3]`.
     pub vertices: Vec<[f64; 3]>,
     /// Three numbers of vertices each.
@@ -30,7 +30,7 @@ impl CloudFormat for Off {
     }
 
     fn recognises(&self, bytes: &[u8]) -> bool {
-        let line = Lines::new(bytes).map(|line| content(line.text)).find(|text| !text.is_empty());
+        let line = ByteLines::new(bytes).map(|line| content(line.text)).find(|text| !text.is_empty());
         line.is_some_and(|text| magic(text).is_some())
     }
 
@@ -46,7 +46,7 @@ impl CloudFormat for Off {
     fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
         parse_mesh(bytes)?;
         let mut lines = significant(bytes);
-        let header = Header::parse(&mut lines)?;
+        let header = OffHeader::parse(&mut lines)?;
         let mut splice = Splice::new(bytes, out);
         for line in lines.take(header.vertices) {
             let (places, old) = triple(&line, 0)?;
@@ -69,7 +69,7 @@ fn content(text: &[u8]) -> &[u8] {
 
 /// The lines that hold anything, without their comments.
 fn significant(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
-    Lines::new(bytes)
+    ByteLines::new(bytes)
         .map(|line| {
             let skipped = line.text.len() - line.text.trim_ascii_start().len();
             let text = content(line.text);
@@ -84,13 +84,13 @@ fn magic(text: &[u8]) -> Option<(&[u8], bool)> {
     words.iter().find_map(|word| Some((text.strip_prefix(*word)?, word.contains(&b'N'))))
 }
 
-struct Header {
+struct OffHeader {
     vertices: usize,
     faces: usize,
     normals: bool,
 }
 
-impl Header {
+impl OffHeader {
     /// The counts may follow `OFF` on its own line with or without a space, as in some ModelNet
     /// files.
     fn parse<'a>(lines: &mut impl Iterator<Item = Line<'a>>) -> Result<Self, FormatError> {
@@ -129,11 +129,11 @@ fn triple(line: &Line, skip: usize) -> Result<([Range<usize>; 3], [f64; 3]), For
 }
 
 /// Reads a text OFF file. Polygons become fans of triangles; colours and normals are passed over.
-pub fn parse_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
+pub fn parse_mesh(bytes: &[u8]) -> Result<OffMesh, FormatError> {
     let mut lines = significant(bytes);
-    let Header { vertices, faces, .. } = Header::parse(&mut lines)?;
+    let OffHeader { vertices, faces, .. } = OffHeader::parse(&mut lines)?;
     // The counts are not trusted with memory: a line takes 6 bytes or more.
-    let mut mesh = Mesh::default();
+    let mut mesh = OffMesh::default();
     mesh.vertices.reserve(vertices.min(bytes.len() / 6));
     for line in lines.by_ref().take(vertices) {
         mesh.vertices.push(triple(&line, 0)?.1);

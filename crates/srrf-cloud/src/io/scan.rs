@@ -31,7 +31,7 @@ impl<'a> Line<'a> {
 
 /// The lines of a file; they end with `\n`, `\r\n` or a lone `\r`.
 #[derive(Debug, Clone)]
-pub(super) struct Lines<'a> {
+pub(super) struct ByteLines<'a> {
     bytes: &'a [u8],
     at: usize,
     number: usize,
@@ -39,7 +39,7 @@ pub(super) struct Lines<'a> {
     cr_only: bool,
 }
 
-impl<'a> Lines<'a> {
+impl<'a> ByteLines<'a> {
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, at: 0, number: 0, cr_only: false }
     }
@@ -57,7 +57,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-impl<'a> Iterator for Lines<'a> {
+impl<'a> Iterator for ByteLines<'a> {
     type Item = Line<'a>;
 
     fn next(&mut self) -> Option<Line<'a>> {
@@ -208,7 +208,7 @@ mod tests {
     use super::*;
 
     fn lines(bytes: &[u8]) -> Vec<(usize, usize, &[u8])> {
-        Lines::new(bytes).map(|line| (line.number, line.start, line.text)).collect()
+        ByteLines::new(bytes).map(|line| (line.number, line.start, line.text)).collect()
     }
 
     #[test]
@@ -217,7 +217,7 @@ mod tests {
         assert_eq!(lines(b"a\n\nbc"), expected);
         assert_eq!(lines(b"a\r\rbc\r"), expected);
         assert_eq!(lines(b"a\r\n\r\nbc\r\n")[2], (3, 5, &b"bc"[..]));
-        let mut header = Lines::of_header(b"ply\rend\r\nbody");
+        let mut header = ByteLines::of_header(b"ply\rend\r\nbody");
         assert_eq!(header.by_ref().take(2).last().map(|line| line.text), Some(&b"end"[..]));
         assert_eq!(header.offset(), 8, "the line feed belongs to the body");
     }

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::io::{self, Write};
 use std::ops::Range;
 
-use super::scan::{Line, Lines, Splice, moved, number, quote, turned};
+use super::scan::{ByteLines, Line, Splice, moved, number, quote, turned};
 use super::single::check_single;
 use super::{CloudFormat, FormatError};
 use crate::Rigid;
@@ -48,7 +48,7 @@ impl CloudFormat for Stl {
             triangles.iter().for_each(|record| (1..4).for_each(|corner| add(vector(record, corner))));
         } else {
             text_rows(bytes, |_, _, kind, point| {
-                if kind == Kind::Vertex {
+                if kind == StlKind::Vertex {
                     add(point);
                 }
                 Ok::<_, FormatError>(())
@@ -65,7 +65,7 @@ impl CloudFormat for Stl {
     fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
         let moved_points: Vec<[f64; 3]> = self.read(bytes)?.into_iter().map(|p| moved(motion, p)).collect();
         let mut splice = Splice::new(bytes, out);
-        let change = |kind: Kind| if kind == Kind::Vertex { moved } else { turned };
+        let change = |kind: StlKind| if kind == StlKind::Vertex { moved } else { turned };
         if !is_binary(bytes)? {
             text_rows(bytes, |_, places, kind, old| splice.numbers(places, old, change(kind)(motion, old)))?;
             return splice.finish();
@@ -74,7 +74,7 @@ impl CloudFormat for Stl {
         for (index, record) in bytes[HEADER..].as_chunks::<RECORD>().0.iter().enumerate() {
             for part in 0..4 {
                 let old = vector(record, part);
-                let new = change(if part == 0 { Kind::Normal } else { Kind::Vertex })(motion, old);
+                let new = change(if part == 0 { StlKind::Normal } else { StlKind::Vertex })(motion, old);
                 for axis in (0..3).filter(|&axis| old[axis] != new[axis] && !new[axis].is_nan()) {
                     let at = HEADER + index * RECORD + part * 12 + axis * 4;
                     splice.replace(at..at + 4, &(new[axis] as f32).to_le_bytes())?;
@@ -132,7 +132,7 @@ fn vector(record: &[u8; RECORD], part: usize) -> [f64; 3] {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Kind {
+enum StlKind {
     Normal,
     Vertex,
 }
@@ -140,11 +140,11 @@ enum Kind {
 /// Goes through the normals and corners of a text file.
 fn text_rows<E: From<FormatError>>(
     bytes: &[u8],
-    mut each: impl FnMut(&Line, &[Range<usize>; 3], Kind, [f64; 3]) -> Result<(), E>,
+    mut each: impl FnMut(&Line, &[Range<usize>; 3], StlKind, [f64; 3]) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut corners = 0usize;
     let mut open = false;
-    for line in Lines::new(bytes) {
+    for line in ByteLines::new(bytes) {
         let mut words = line.words();
         let Some((_, word)) = words.next() else { continue };
         let kind = match word.to_ascii_lowercase().as_slice() {
@@ -165,11 +165,11 @@ fn text_rows<E: From<FormatError>>(
             b"facet" => {
                 words.next();
                 corners = 0;
-                Kind::Normal
+                StlKind::Normal
             }
             b"vertex" => {
                 corners += 1;
-                Kind::Vertex
+                StlKind::Vertex
             }
             _ => return Err(line.error(format!("{} begins no line of a text STL", quote(word))).into()),
         };

@@ -34,6 +34,9 @@ fn local_frames_keep_survey_coordinates_exact() {
     let matrix = &encoded.poses[0].matrix;
     assert!(matrix.iter().all(|v| v.abs() < 10.0), "{matrix:?}");
     for (p, q) in source.points().iter().zip(target.points()) {
+        let local = |p: &[f64; 3], centre: &[f64; 3]| -> [f32; 3] {
+            std::array::from_fn(|axis| (p[axis] - centre[axis]) as f32)
+        };
         let moved = apply(matrix, &local(p, &encoded.source.points.centre).map(f64::from));
         let expected = local(q, &encoded.target.points.centre);
         assert!((0..3).all(|c| (moved[c] - f64::from(expected[c])).abs() < 2e-6));
@@ -91,4 +94,18 @@ fn the_strongest_matches_are_kept_in_order() {
     assert_eq!(encoded.matches[0].weight, 5.0);
     assert!(encoded.matches.windows(2).all(|w| w[0].weight >= w[1].weight));
     assert!(encoded.matches.last().unwrap().weight > 0.0);
+}
+
+#[test]
+fn says_in_words_what_the_picture_shows() {
+    let cloud =
+        PointCloud::new(vec![[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]]).unwrap();
+    let mut pose = Rigid::identity();
+    pose.translation.x = 0.5;
+    let pair = Pair::new("p", &cloud, &cloud).pose(Pose::new("icp", pose)).unit("mm");
+    let text = encode(&pair, 1).description;
+    assert!(text.contains("4 points, in orange"), "{text}");
+    assert!(text.contains("(as given), half of the source's points lie within 0 mm"), "{text}");
+    assert!(text.contains("“icp” turns the source by 0 degrees and moves its centre by 0.5 mm"), "{text}");
+    assert!(text.ends_with("nine in ten within 0.5 mm."), "{text}");
 }

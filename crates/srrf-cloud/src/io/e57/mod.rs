@@ -52,39 +52,42 @@ impl CloudFormat for E57 {
 }
 
 /// What goes wrong inside.
-enum Problem {
+enum E57Problem {
     Library(e57::Error),
     Format(FormatError),
 }
 
-impl From<e57::Error> for Problem {
+impl From<e57::Error> for E57Problem {
     fn from(error: e57::Error) -> Self {
         Self::Library(error)
     }
 }
 
 /// Runs `work` of the `e57` crate; a panic on a damaged file becomes an error.
-fn guarded<T>(work: impl FnOnce() -> Result<T, Problem>) -> Result<T, FormatError> {
+fn guarded<T>(work: impl FnOnce() -> Result<T, E57Problem>) -> Result<T, FormatError> {
     let damaged =
         |problem: String| FormatError::Content(format!("the E57 file is damaged or cut short: {problem}"));
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(value)) => Ok(value),
-        Ok(Err(Problem::Library(error))) => Err(damaged(error.to_string())),
-        Ok(Err(Problem::Format(error))) => Err(error),
+        Ok(Err(E57Problem::Library(error))) => Err(damaged(error.to_string())),
+        Ok(Err(E57Problem::Format(error))) => Err(error),
         Err(_) => Err(damaged("it follows no rules".to_owned())),
     }
 }
 
-fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, Problem> {
+fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, E57Problem> {
     let mut reader = E57Reader::new(Cursor::new(bytes))?;
     let mut points = Vec::new();
     for scan in reader.pointclouds() {
         let bits = scan.prototype.iter().map(|record| u128::from(bits(&record.data_type))).sum::<u128>();
         if scan.records > 0 && (bits == 0 || bits * u128::from(scan.records) > 8 * bytes.len() as u128) {
             let announced = format!("{} points of {bits} bits", scan.records);
-            return Err(Problem::Format(FormatError::truncated(announced, format!("{} bytes", bytes.len()))));
+            return Err(E57Problem::Format(FormatError::truncated(
+                announced,
+                format!("{} bytes", bytes.len()),
+            )));
         }
-        let columns = Columns::of(&scan.prototype).map_err(Problem::Format)?;
+        let columns = XyzColumns::of(&scan.prototype).map_err(E57Problem::Format)?;
         let pose = scan.transform.as_ref().map(|pose| {
             let (q, t) = (&pose.rotation, &pose.translation);
             let rotation = UnitQuaternion::from_quaternion(Quaternion::new(q.w, q.x, q.y, q.z));
@@ -113,13 +116,13 @@ fn bits(kind: &RecordDataType) -> u32 {
 }
 
 /// Where the coordinates of a scan are.
-struct Columns {
+struct XyzColumns {
     axes: [usize; 3],
     spherical: bool,
     invalid: Option<usize>,
 }
 
-impl Columns {
+impl XyzColumns {
     fn of(prototype: &[Record]) -> Result<Self, FormatError> {
         let find = |name: RecordName| prototype.iter().position(|record| record.name == name);
         let triple = |names: [RecordName; 3]| {
@@ -161,7 +164,7 @@ impl Columns {
 }
 
 /// A whole file with one scan.
-fn file(points: &[[f64; 3]]) -> Result<Vec<u8>, Problem> {
+fn file(points: &[[f64; 3]]) -> Result<Vec<u8>, E57Problem> {
     let mut out = Cursor::new(Vec::new());
     let mut writer = E57Writer::new(&mut out, "{00000000-0000-4000-8000-000000000000}")?;
     let names = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];

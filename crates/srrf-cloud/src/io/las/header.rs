@@ -13,12 +13,12 @@ const VLR: usize = 54;
 
 /// How steps of a coordinate become its value: `steps * scale + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Axis {
+pub(super) struct LasAxis {
     pub scale: f64,
     pub offset: f64,
 }
 
-impl Axis {
+impl LasAxis {
     pub fn value(self, steps: i32) -> f64 {
         f64::from(steps) * self.scale + self.offset
     }
@@ -28,14 +28,14 @@ impl Axis {
     }
 }
 
-pub(super) struct Header {
+pub(super) struct LasHeader {
     /// Offset of the first point.
     pub points_at: usize,
     pub points: u64,
     /// Bytes of each uncompressed point.
     pub record_length: usize,
     pub zipped: bool,
-    pub axes: [Axis; 3],
+    pub axes: [LasAxis; 3],
     length: usize,
     vlrs: u32,
 }
@@ -48,7 +48,7 @@ fn double(bytes: &[u8], at: usize) -> Option<f64> {
     word(bytes, at).map(f64::from_le_bytes)
 }
 
-impl Header {
+impl LasHeader {
     pub fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
         if !bytes.starts_with(b"LASF") {
             return Err(FormatError::Content("the file does not begin with LASF".into()));
@@ -64,9 +64,9 @@ impl Header {
         let legacy = u64::from(u32::from_le_bytes(word(bytes, 107)?));
         let large = if length >= HEADER_14 { u64::from_le_bytes(word(bytes, 247)?) } else { 0 };
         let format = *bytes.get(104)?;
-        let mut axes = [Axis { scale: 1.0, offset: 0.0 }; 3];
+        let mut axes = [LasAxis { scale: 1.0, offset: 0.0 }; 3];
         for (axis, slot) in axes.iter_mut().enumerate() {
-            *slot = Axis { scale: double(bytes, 131 + 8 * axis)?, offset: double(bytes, 155 + 8 * axis)? };
+            *slot = LasAxis { scale: double(bytes, 131 + 8 * axis)?, offset: double(bytes, 155 + 8 * axis)? };
         }
         word::<48>(bytes, 179)?;
         Some(Self {
@@ -95,7 +95,7 @@ impl Header {
         if self.record_length < 20 {
             return wrong(format!("points of {} bytes, 20 is the least", self.record_length));
         }
-        let usable = |axis: &Axis| axis.scale.is_finite() && axis.scale != 0.0 && axis.offset.is_finite();
+        let usable = |axis: &LasAxis| axis.scale.is_finite() && axis.scale != 0.0 && axis.offset.is_finite();
         if !self.axes.iter().all(usable) {
             return wrong(format!(
                 "the scales and offsets {:?}",
@@ -149,7 +149,7 @@ pub(super) fn put_word(bytes: &mut [u8], at: usize, word: &[u8]) {
 }
 
 /// Writes scales, offsets and bounds.
-pub(super) fn put_axes(bytes: &mut [u8], axes: &[Axis; 3], points: &[[f64; 3]]) {
+pub(super) fn put_axes(bytes: &mut [u8], axes: &[LasAxis; 3], points: &[[f64; 3]]) {
     for (index, axis) in axes.iter().enumerate() {
         put_word(bytes, 131 + 8 * index, &axis.scale.to_le_bytes());
         put_word(bytes, 155 + 8 * index, &axis.offset.to_le_bytes());
@@ -165,7 +165,7 @@ pub(super) fn put_axes(bytes: &mut [u8], axes: &[Axis; 3], points: &[[f64; 3]]) 
 /// compressed.
 pub(super) fn new_header(
     points: &[[f64; 3]],
-    axes: &[Axis; 3],
+    axes: &[LasAxis; 3],
     zipped: bool,
 ) -> Result<(Vec<u8>, Option<LazVlr>), FormatError> {
     let count = u32::try_from(points.len()).map_err(|_| {

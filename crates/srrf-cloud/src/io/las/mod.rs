@@ -9,7 +9,7 @@ mod zipped;
 use std::borrow::Cow;
 use std::io::{self, Write};
 
-use self::header::{Axis, Header};
+use self::header::{LasAxis, LasHeader};
 use super::scan::moved;
 use super::{CloudFormat, FormatError};
 use crate::Rigid;
@@ -78,12 +78,12 @@ impl CloudFormat for Laz {
 }
 
 fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
-    let header = Header::parse(bytes)?;
+    let header = LasHeader::parse(bytes)?;
     Ok(points(&header, &records(&header, bytes)?))
 }
 
 /// The points of a file as records, uncompressed.
-fn records<'a>(header: &Header, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>, FormatError> {
+fn records<'a>(header: &LasHeader, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>, FormatError> {
     if header.zipped {
         return zipped::decompress(header, header.laz(bytes)?, bytes).map(Cow::Owned);
     }
@@ -97,7 +97,7 @@ fn records<'a>(header: &Header, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>, Format
 }
 
 /// The points of uncompressed records.
-fn points(header: &Header, records: &[u8]) -> Vec<[f64; 3]> {
+fn points(header: &LasHeader, records: &[u8]) -> Vec<[f64; 3]> {
     let word = |record: &[u8], axis: usize| {
         record
             .get(axis * 4..)
@@ -110,8 +110,8 @@ fn points(header: &Header, records: &[u8]) -> Vec<[f64; 3]> {
 }
 
 /// The axes that hold `points`, with a step of at most `coarsest`.
-fn axes_for(points: &[[f64; 3]], coarsest: Option<[f64; 3]>) -> Result<[Axis; 3], FormatError> {
-    let mut axes = [Axis { scale: 1.0, offset: 0.0 }; 3];
+fn axes_for(points: &[[f64; 3]], coarsest: Option<[f64; 3]>) -> Result<[LasAxis; 3], FormatError> {
+    let mut axes = [LasAxis { scale: 1.0, offset: 0.0 }; 3];
     for (axis, slot) in axes.iter_mut().enumerate() {
         let values = || points.iter().map(|p| p[axis]);
         let (low, high) =
@@ -153,7 +153,7 @@ fn file(points: &[[f64; 3]], zipped: bool) -> io::Result<Vec<u8>> {
 }
 
 /// Puts the coordinates into records.
-fn put_points(points: &[[f64; 3]], axes: &[Axis; 3], length: usize, records: &mut [u8]) {
+fn put_points(points: &[[f64; 3]], axes: &[LasAxis; 3], length: usize, records: &mut [u8]) {
     for (record, point) in records.chunks_exact_mut(length).zip(points) {
         for (axis, slot) in record.as_chunks_mut::<4>().0.iter_mut().take(3).enumerate() {
             *slot = axes[axis].steps(point[axis]).to_le_bytes();
@@ -162,7 +162,7 @@ fn put_points(points: &[[f64; 3]], axes: &[Axis; 3], length: usize, records: &mu
 }
 
 fn rewritten(bytes: &[u8], motion: &Rigid) -> io::Result<Vec<u8>> {
-    let header = Header::parse(bytes)?;
+    let header = LasHeader::parse(bytes)?;
     let mut records = records(&header, bytes)?.into_owned();
     let old = points(&header, &records);
     let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();

@@ -29,7 +29,7 @@ fn version_1_4() -> Vec<u8> {
     bytes[104] = 7;
     bytes[105..107].copy_from_slice(&37u16.to_le_bytes());
     bytes[247..255].copy_from_slice(&(POINTS.len() as u64).to_le_bytes());
-    let axes = [0, 1, 2].map(|axis| Axis { scale: 0.001, offset: POINTS[3][axis] });
+    let axes = [0, 1, 2].map(|axis| LasAxis { scale: 0.001, offset: POINTS[3][axis] });
     header::put_axes(&mut bytes, &axes, &POINTS);
     for (index, point) in POINTS.iter().enumerate() {
         let mut record = [index as u8 + 1; 37];
@@ -95,7 +95,7 @@ fn a_moved_copy_keeps_the_rest() {
         let copy = rewritten(&bytes, &motion).unwrap();
         assert!(distance(&read(&copy).unwrap(), &new) <= 0.000_011);
         assert_eq!(rewritten(&bytes, &Rigid::identity()).unwrap(), bytes);
-        let (before, after) = (Header::parse(&bytes).unwrap(), Header::parse(&copy).unwrap());
+        let (before, after) = (LasHeader::parse(&bytes).unwrap(), LasHeader::parse(&copy).unwrap());
         let (a, b) = (records(&before, &bytes).unwrap(), records(&after, &copy).unwrap());
         for (a, b) in a.chunks(before.record_length).zip(b.chunks(after.record_length)) {
             assert_eq!(a[12..], b[12..], "attributes");

@@ -7,7 +7,7 @@ use laz::laszip::LazItemType;
 use laz::{LasZipCompressor, LasZipDecompressor, LazVlr};
 
 use super::super::FormatError;
-use super::header::Header;
+use super::header::LasHeader;
 use super::laz_record::{damaged, guarded};
 
 /// Points may unpack to this many times the file's size and `SLACK` more: real clouds do not come
@@ -69,7 +69,7 @@ fn check_layers(bytes: &[u8], at: usize, length: usize, layers: usize) -> Result
 }
 
 /// The records of all points.
-pub(super) fn decompress(header: &Header, vlr: LazVlr, bytes: &[u8]) -> Result<Vec<u8>, FormatError> {
+pub(super) fn decompress(header: &LasHeader, vlr: LazVlr, bytes: &[u8]) -> Result<Vec<u8>, FormatError> {
     let length = header.record_length;
     let size = usize::try_from(header.points).ok().and_then(|n| n.checked_mul(length));
     let most = bytes.len().saturating_mul(RATIO).saturating_add(SLACK);

@@ -6,12 +6,12 @@ use super::super::scan::quote;
 
 /// A type of numbers and its byte order.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Kind {
+pub(super) struct NpyKind {
     pub scalar: Scalar,
     pub big_endian: bool,
 }
 
-impl Kind {
+impl NpyKind {
     fn parse(name: &[u8]) -> Result<Self, FormatError> {
         let scalar = match name.get(1..).unwrap_or_default() {
             b"f4" => Scalar::F32,
@@ -49,13 +49,13 @@ impl Kind {
 /// What the elements of an array are.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Descr {
-    Plain(Kind),
+    Plain(NpyKind),
     /// Named fields, one after the other.
-    Fields(Vec<(String, Kind)>),
+    Fields(Vec<(String, NpyKind)>),
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Header {
+pub(super) struct NpyHeader {
     pub descr: Descr,
     pub fortran: bool,
     pub shape: Vec<u64>,
@@ -63,7 +63,7 @@ pub(super) struct Header {
     pub body: usize,
 }
 
-impl Header {
+impl NpyHeader {
     /// Reads the header at the begin of `bytes`. A small parser of our own: `npyz` hands the text to
     /// a recursive one, and trusts the length before it.
     ///
@@ -101,7 +101,7 @@ impl Header {
         let descr = match descr {
             Descr::Plain(kind) => format!("'{}'", kind.name()),
             Descr::Fields(fields) => {
-                let field = |(name, kind): &(String, Kind)| {
+                let field = |(name, kind): &(String, NpyKind)| {
                     let quote = if name.contains('\'') { '"' } else { '\'' };
                     format!("({quote}{name}{quote}, '{}')", kind.name())
                 };
@@ -179,7 +179,7 @@ impl<'a> Parser<'a> {
         word
     }
 
-    fn dictionary(&mut self) -> Result<Header, FormatError> {
+    fn dictionary(&mut self) -> Result<NpyHeader, FormatError> {
         let (mut descr, mut fortran, mut shape) = (None, None, None);
         self.expect(b'{')?;
         while !self.eat(b'}') {
@@ -203,21 +203,21 @@ impl<'a> Parser<'a> {
             }
         }
         match (descr, fortran, shape) {
-            (Some(descr), Some(fortran), Some(shape)) => Ok(Header { descr, fortran, shape, body: 0 }),
+            (Some(descr), Some(fortran), Some(shape)) => Ok(NpyHeader { descr, fortran, shape, body: 0 }),
             _ => Err(FormatError::Content("the NumPy header lacks descr, fortran_order or shape".into())),
         }
     }
 
     fn descr(&mut self) -> Result<Descr, FormatError> {
         if !self.eat(b'[') {
-            return Ok(Descr::Plain(Kind::parse(self.string()?)?));
+            return Ok(Descr::Plain(NpyKind::parse(self.string()?)?));
         }
         let mut fields = Vec::new();
         while !self.eat(b']') {
             self.expect(b'(')?;
             let name = String::from_utf8_lossy(self.string()?).into_owned();
             self.expect(b',')?;
-            fields.push((name, Kind::parse(self.string()?)?));
+            fields.push((name, NpyKind::parse(self.string()?)?));
             // A third entry would be the shape of an array inside the field.
             self.expect(b')')?;
             if !self.eat(b',') {

@@ -7,13 +7,13 @@ pub use array::Array;
 
 use std::io::{self, Write};
 
-use self::header::{Descr, Header, Kind};
+use self::header::{Descr, NpyHeader, NpyKind};
 use super::scalar::Scalar;
 use super::scan::moved;
 use super::{CloudFormat, FormatError};
 use crate::Rigid;
 
-const DOUBLE: Kind = Kind { scalar: Scalar::F64, big_endian: false };
+const DOUBLE: NpyKind = NpyKind { scalar: Scalar::F64, big_endian: false };
 
 /// An array `[n, columns]` of at least 3 columns, in C or Fortran order, of single or double
 /// precision or integers, whose first three columns are x, y and z; or an array `[n]` with fields
@@ -36,16 +36,16 @@ impl CloudFormat for Npy {
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
-        Ok(Table::parse(bytes)?.points())
+        Ok(NpyTable::parse(bytes)?.points())
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&Header::bytes(&Descr::Plain(DOUBLE), false, &[points.len() as u64, 3]))?;
+        out.write_all(&NpyHeader::bytes(&Descr::Plain(DOUBLE), false, &[points.len() as u64, 3]))?;
         points.iter().flatten().try_for_each(|c| out.write_all(&c.to_le_bytes()))
     }
 
     fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-        let table = Table::parse(bytes)?;
+        let table = NpyTable::parse(bytes)?;
         let old = table.points();
         let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
         let fits = |axis: usize| {
@@ -54,7 +54,7 @@ impl CloudFormat for Npy {
         };
         let all_fit = (0..3).all(fits);
         // All columns of a plain array have one type.
-        let kinds: Vec<Kind> = match &table.header.descr {
+        let kinds: Vec<NpyKind> = match &table.header.descr {
             _ if all_fit => table.kinds.clone(),
             Descr::Plain(_) => vec![DOUBLE; table.kinds.len()],
             Descr::Fields(_) => {
@@ -72,7 +72,7 @@ impl CloudFormat for Npy {
         if all_fit {
             out.write_all(&bytes[..table.header.body])?;
         } else {
-            out.write_all(&Header::bytes(&descr, table.header.fortran, &table.header.shape))?;
+            out.write_all(&NpyHeader::bytes(&descr, table.header.fortran, &table.header.shape))?;
         }
         let mut cells: Vec<u8> = Vec::with_capacity(table.body.len());
         table.in_order(|row, column| {
@@ -94,11 +94,11 @@ impl CloudFormat for Npy {
 }
 
 /// The numbers of an array as rows and columns.
-pub(super) struct Table<'a> {
-    header: Header,
+pub(super) struct NpyTable<'a> {
+    header: NpyHeader,
     body: &'a [u8],
     rows: usize,
-    kinds: Vec<Kind>,
+    kinds: Vec<NpyKind>,
     /// Of each column: the offset of its first number, and the step from row to row.
     layout: Vec<(usize, usize)>,
     /// The columns of x, y and z.
@@ -107,7 +107,7 @@ pub(super) struct Table<'a> {
 
 /// Whether the array at the begin of `bytes` could be a cloud, and how many bytes it takes.
 pub(super) fn cloud_bytes(bytes: &[u8]) -> Option<usize> {
-    let header = Header::parse(bytes).ok()?;
+    let header = NpyHeader::parse(bytes).ok()?;
     let columns = match (&header.descr, &header.shape[..]) {
         (Descr::Plain(kind), &[_, columns]) if columns >= 3 => {
             columns.checked_mul(kind.scalar.size() as u64)?
@@ -121,9 +121,9 @@ pub(super) fn cloud_bytes(bytes: &[u8]) -> Option<usize> {
     usize::try_from(header.shape[0].checked_mul(columns)?).ok()?.checked_add(header.body)
 }
 
-impl<'a> Table<'a> {
+impl<'a> NpyTable<'a> {
     pub fn parse(bytes: &'a [u8]) -> Result<Self, FormatError> {
-        let header = Header::parse(bytes)?;
+        let header = NpyHeader::parse(bytes)?;
         let body = &bytes[header.body..];
         let whole = cloud_bytes(bytes);
         let shape = &header.shape;

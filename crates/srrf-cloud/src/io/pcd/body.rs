@@ -3,21 +3,21 @@
 use std::borrow::Cow;
 
 use super::super::FormatError;
-use super::super::scan::{Line, Lines, number, quote};
-use super::header::{Encoding, Header};
+use super::super::scan::{ByteLines, Line, number, quote};
+use super::header::{PcdEncoding, PcdHeader};
 use super::lzf;
 
 /// The numbers of a binary file, one field after the other or point by point.
-pub(super) struct Table<'a> {
+pub(super) struct PcdTable<'a> {
     pub bytes: Cow<'a, [u8]>,
     /// Of each field: the offset of its first number, and the step from point to point.
     pub layout: Vec<(usize, usize)>,
 }
 
-impl<'a> Table<'a> {
+impl<'a> PcdTable<'a> {
     /// # Errors
     /// [`FormatError`] where there are other numbers than the header announces.
-    pub fn new(bytes: &'a [u8], header: &Header) -> Result<Self, FormatError> {
+    pub fn new(bytes: &'a [u8], header: &PcdHeader) -> Result<Self, FormatError> {
         let rest = bytes.get(header.body..).unwrap_or_default();
         let announced = || {
             let stride =
@@ -28,7 +28,7 @@ impl<'a> Table<'a> {
         let (stride, size) = header.sizes().ok_or_else(|| short(rest.len()))?;
         let mut layout = Vec::with_capacity(header.fields.len());
         let mut at = 0;
-        if header.encoding == Encoding::Binary {
+        if header.encoding == PcdEncoding::Binary {
             let body = rest.get(..size).ok_or_else(|| short(rest.len()))?;
             if rest.len() - size >= stride.max(1) && rest[size..].iter().any(|&b| b != 0) {
                 let problem = format!(
@@ -74,7 +74,7 @@ impl<'a> Table<'a> {
     }
 
     /// Three fields of all points.
-    pub fn triples(&self, header: &Header, fields: [usize; 3]) -> Vec<[f64; 3]> {
+    pub fn triples(&self, header: &PcdHeader, fields: [usize; 3]) -> Vec<[f64; 3]> {
         let value = |field: usize, point: usize| {
             let number = header.fields[field].scalar.get(&self.bytes, self.place(field, point), false);
             number.unwrap_or(f64::NAN)
@@ -86,13 +86,13 @@ impl<'a> Table<'a> {
 /// Goes through the lines of a text file: `each` gets the words of a point.
 pub(super) fn ascii_rows<E: From<FormatError>>(
     bytes: &[u8],
-    header: &Header,
+    header: &PcdHeader,
     mut each: impl FnMut(&Line, &[(usize, &[u8])]) -> Result<(), E>,
 ) -> Result<(), E> {
     let columns = header.fields.iter().map(|field| field.count).sum::<usize>();
     let mut words = Vec::new();
     let mut found = 0;
-    for line in Lines::new(&bytes[header.body..]) {
+    for line in ByteLines::new(&bytes[header.body..]) {
         let number = line.number + header.lines;
         let line = Line { number, start: line.start + header.body, ..line };
         words.clear();
@@ -117,7 +117,7 @@ pub(super) fn ascii_rows<E: From<FormatError>>(
 }
 
 /// The index of the first word of a field on a line.
-pub(super) fn column(header: &Header, field: usize) -> usize {
+pub(super) fn column(header: &PcdHeader, field: usize) -> usize {
     header.fields[..field].iter().map(|field| field.count).sum()
 }
 
@@ -137,10 +137,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
         let begin = quote(&bytes[..bytes.len().min(20)]);
         return Err(FormatError::Content(format!("the file begins with {begin}, not with a PCD header")));
     }
-    let header = Header::parse(bytes)?;
+    let header = PcdHeader::parse(bytes)?;
     let axes = header.axes()?;
-    if header.encoding != Encoding::Ascii {
-        return Ok(Table::new(bytes, &header)?.triples(&header, axes));
+    if header.encoding != PcdEncoding::Ascii {
+        return Ok(PcdTable::new(bytes, &header)?.triples(&header, axes));
     }
     let columns = axes.map(|axis| column(&header, axis));
     // The count is not trusted with memory: a number takes two bytes or more.

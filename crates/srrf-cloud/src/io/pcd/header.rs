@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use super::super::FormatError;
 use super::super::scalar::Scalar;
-use super::super::scan::{Line, Lines, quote};
+use super::super::scan::{ByteLines, Line, quote};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Encoding {
+pub(super) enum PcdEncoding {
     Ascii,
     Binary,
     Compressed,
@@ -28,10 +28,10 @@ impl Field {
     }
 }
 
-pub(super) struct Header {
+pub(super) struct PcdHeader {
     pub fields: Vec<Field>,
     pub points: usize,
-    pub encoding: Encoding,
+    pub encoding: PcdEncoding,
     /// Offset of the first byte behind the header, and the number of its lines.
     pub body: usize,
     pub lines: usize,
@@ -49,11 +49,11 @@ struct Words<'a> {
     points: Option<u64>,
 }
 
-impl Header {
+impl PcdHeader {
     /// # Errors
     /// [`FormatError`] with the line that cannot be understood.
     pub fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
-        let mut lines = Lines::of_header(bytes);
+        let mut lines = ByteLines::of_header(bytes);
         let mut words = Words::default();
         let mut number = 0;
         while let Some(line) = lines.next() {
@@ -71,11 +71,11 @@ impl Header {
                 b"POINTS" => words.points = Some(single(&line)?),
                 b"DATA" => {
                     let encoding = match tail.next().map(|(_, word)| word) {
-                        Some(b"ascii") => Encoding::Ascii,
+                        Some(b"ascii") => PcdEncoding::Ascii,
                         // A cut line could be either of the two.
                         _ if lines.offset() == line.start + line.text.len() => break,
-                        Some(b"binary") => Encoding::Binary,
-                        Some(b"binary_compressed") => Encoding::Compressed,
+                        Some(b"binary") => PcdEncoding::Binary,
+                        Some(b"binary_compressed") => PcdEncoding::Compressed,
                         _ => return Err(line.error("DATA is none of ascii, binary, binary_compressed")),
                     };
                     let (fields, points) = (words.fields(&line)?, words.points(&line)?);

@@ -5,13 +5,13 @@ use std::io::{self, Write};
 use super::super::FormatError;
 use super::super::scalar::Scalar;
 use super::super::scan::{Splice, moved, turned};
-use super::body::{Table, ascii_rows, column, numbers, read};
-use super::header::{Encoding, Header};
+use super::body::{PcdTable, ascii_rows, column, numbers, read};
+use super::header::{PcdEncoding, PcdHeader};
 use super::lzf;
 use crate::Rigid;
 
 /// What becomes of three fields.
-struct Change {
+struct PcdChange {
     fields: [usize; 3],
     kinds: [Scalar; 3],
     old: Vec<[f64; 3]>,
@@ -22,15 +22,15 @@ struct Change {
 /// stays. A coordinate whose type cannot hold the moved numbers becomes a double.
 pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
     let old = read(bytes)?;
-    let header = Header::parse(bytes)?;
+    let header = PcdHeader::parse(bytes)?;
     let axes = header.axes()?;
     let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
     let kinds = [0, 1, 2].map(|axis| header.fields[axes[axis]].scalar.for_moved(axis, &old, &new));
-    let mut changes = vec![Change { fields: axes, kinds, old, new }];
+    let mut changes = vec![PcdChange { fields: axes, kinds, old, new }];
     let normals = header.triple(["normal_x", "normal_y", "normal_z"]);
 
     let body = match header.encoding {
-        Encoding::Ascii => {
+        PcdEncoding::Ascii => {
             if let Some(fields) = normals {
                 let columns = fields.map(|field| column(&header, field));
                 let mut old = Vec::new();
@@ -43,8 +43,8 @@ pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::
             }
             None
         }
-        Encoding::Binary | Encoding::Compressed => {
-            let table = Table::new(bytes, &header)?;
+        PcdEncoding::Binary | PcdEncoding::Compressed => {
+            let table = PcdTable::new(bytes, &header)?;
             if let Some(fields) = normals {
                 changes.push(turn(&header, fields, table.triples(&header, fields), motion));
             }
@@ -52,7 +52,7 @@ pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::
             if body == *table.bytes {
                 return out.write_all(bytes);
             }
-            Some(if header.encoding == Encoding::Compressed { compressed(&body)? } else { body })
+            Some(if header.encoding == PcdEncoding::Compressed { compressed(&body)? } else { body })
         }
     };
 
@@ -97,13 +97,13 @@ pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::
     splice.finish()
 }
 
-fn turn(header: &Header, fields: [usize; 3], old: Vec<[f64; 3]>, motion: &Rigid) -> Change {
+fn turn(header: &PcdHeader, fields: [usize; 3], old: Vec<[f64; 3]>, motion: &Rigid) -> PcdChange {
     let new = old.iter().map(|&normal| turned(motion, normal)).collect();
-    Change { fields, kinds: fields.map(|field| header.fields[field].scalar.for_turned()), old, new }
+    PcdChange { fields, kinds: fields.map(|field| header.fields[field].scalar.for_turned()), old, new }
 }
 
 /// All numbers with the changed ones in place, in the layout of the file.
-fn binary_body(header: &Header, table: &Table, changes: &[Change]) -> Vec<u8> {
+fn binary_body(header: &PcdHeader, table: &PcdTable, changes: &[PcdChange]) -> Vec<u8> {
     let mut out = Vec::with_capacity(table.bytes.len());
     let put = |field: usize, point: usize, out: &mut Vec<u8>| {
         let place = table.place(field, point);
@@ -120,7 +120,7 @@ fn binary_body(header: &Header, table: &Table, changes: &[Change]) -> Vec<u8> {
         }
     };
     let fields = 0..header.fields.len();
-    if header.encoding == Encoding::Binary {
+    if header.encoding == PcdEncoding::Binary {
         (0..header.points).for_each(|point| fields.clone().for_each(|field| put(field, point, &mut out)));
         return out;
     }

@@ -70,11 +70,11 @@ fn a_moved_copy_keeps_the_rest() {
         let mut copy = Vec::new();
         Pcd.rewrite(&bytes, &motion, &mut copy).unwrap();
         assert_eq!(Pcd.read(&copy).unwrap(), expected);
-        let head = header::Header::parse(&copy).unwrap();
+        let head = header::PcdHeader::parse(&copy).unwrap();
         let sizes: Vec<usize> = head.fields.iter().map(header::Field::bytes).collect();
         assert_eq!(sizes, [4, 4, 8, 4, 4, 4, 4, 8], "y needs a fraction now; x does not need more");
-        if head.encoding != header::Encoding::Ascii {
-            let table = body::Table::new(&copy, &head).unwrap();
+        if head.encoding != header::PcdEncoding::Ascii {
+            let table = body::PcdTable::new(&copy, &head).unwrap();
             let normals = table.triples(&head, head.triple(["normal_x", "normal_y", "normal_z"]).unwrap());
             assert_eq!(normals, [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]);
             let at = table.place(3, 1);

@@ -5,20 +5,20 @@ use std::ops::Range;
 use super::super::FormatError;
 use super::super::scalar::Scalar;
 use super::super::scan::number;
-use super::header::{Element, Encoding, Header, Property};
+use super::header::{Element, PlyEncoding, PlyHeader, Property};
 
 /// A place in the body that moves on number by number.
 pub(super) struct Cursor<'a> {
     pub bytes: &'a [u8],
     pub at: usize,
-    pub encoding: Encoding,
+    pub encoding: PlyEncoding,
 }
 
 impl<'a> Cursor<'a> {
     /// The place of the first row of `vertex`, and that element.
     pub fn at_vertices<'h>(
         bytes: &'a [u8],
-        header: &'h Header,
+        header: &'h PlyHeader,
     ) -> Result<(Self, &'h Element, bool), FormatError> {
         let mut cursor = Self { bytes, at: header.body, encoding: header.encoding };
         for (index, element) in header.elements.iter().enumerate() {
@@ -35,8 +35,8 @@ impl<'a> Cursor<'a> {
     pub fn next(&mut self, scalar: Scalar) -> Option<Range<usize>> {
         let rest = self.bytes.get(self.at..)?;
         let (skipped, length) = match self.encoding {
-            Encoding::Binary { .. } => (0, (rest.len() >= scalar.size()).then_some(scalar.size())?),
-            Encoding::Ascii => {
+            PlyEncoding::Binary { .. } => (0, (rest.len() >= scalar.size()).then_some(scalar.size())?),
+            PlyEncoding::Ascii => {
                 let begin = rest.iter().position(|b| !b.is_ascii_whitespace())?;
                 let word = &rest[begin..];
                 (begin, word.iter().position(u8::is_ascii_whitespace).unwrap_or(word.len()))
@@ -51,10 +51,10 @@ impl<'a> Cursor<'a> {
     #[inline]
     pub fn value(&self, place: &Range<usize>, scalar: Scalar) -> Result<f64, FormatError> {
         match self.encoding {
-            Encoding::Binary { big_endian } => scalar
+            PlyEncoding::Binary { big_endian } => scalar
                 .get(self.bytes, place.start, big_endian)
                 .ok_or_else(|| FormatError::truncated("a number", "the end of the file")),
-            Encoding::Ascii => {
+            PlyEncoding::Ascii => {
                 number(&self.bytes[place.clone()]).map_err(|e| FormatError::line(self.line(place.start), e))
             }
         }
@@ -73,11 +73,13 @@ impl<'a> Cursor<'a> {
         if !(count >= 0.0 && count.fract() == 0.0) {
             let problem = format!("the list `{}` has the length {count}", property.name);
             return Err(match self.encoding {
-                Encoding::Ascii => FormatError::line(self.line(place.start), problem),
-                Encoding::Binary { .. } => FormatError::Content(format!("byte {}: {problem}", place.start)),
+                PlyEncoding::Ascii => FormatError::line(self.line(place.start), problem),
+                PlyEncoding::Binary { .. } => {
+                    FormatError::Content(format!("byte {}: {problem}", place.start))
+                }
             });
         }
-        if let Encoding::Binary { .. } = self.encoding {
+        if let PlyEncoding::Binary { .. } = self.encoding {
             // A float count saturates; more than there are bytes is the end of the file.
             let bytes = (count as usize).checked_mul(property.scalar.size());
             return Ok(bytes.filter(|&n| n <= self.bytes.len() - self.at).map(|n| {
@@ -126,7 +128,7 @@ fn cut_short(element: &Element, found: u64) -> FormatError {
 
 /// The points of a PLY file.
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
-    let header = Header::parse(bytes)?;
+    let header = PlyHeader::parse(bytes)?;
     let (mut cursor, element, last) = Cursor::at_vertices(bytes, &header)?;
     let axes = element
         .triple(["x", "y", "z"])
@@ -134,7 +136,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
     let kinds = axes.map(|axis| element.properties[axis].scalar);
     let mut points = Vec::new();
     match (header.encoding, element.stride()) {
-        (Encoding::Binary { big_endian }, Some(stride)) => {
+        (PlyEncoding::Binary { big_endian }, Some(stride)) => {
             let body = &bytes[cursor.at..];
             let count = usize::try_from(element.count).unwrap_or(usize::MAX);
             if count > body.len() / stride {
@@ -159,7 +161,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
         }
     }
     // With lists, any bytes behind the rows could be read as one more.
-    let countable = header.encoding == Encoding::Ascii || element.stride().is_some();
+    let countable = header.encoding == PlyEncoding::Ascii || element.stride().is_some();
     if last && countable && element.properties.iter().all(|p| matches!(cursor.property(p), Ok(Some(_)))) {
         let problem = format!(
             "{} elements `vertex` announced, but more rows follow; correct the count in the header",

@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use super::super::FormatError;
 use super::super::scalar::Scalar;
-use super::super::scan::{Line, Lines, quote};
+use super::super::scan::{ByteLines, Line, quote};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Encoding {
+pub(super) enum PlyEncoding {
     Ascii,
     Binary { big_endian: bool },
 }
@@ -42,8 +42,8 @@ impl Element {
     }
 }
 
-pub(super) struct Header {
-    pub encoding: Encoding,
+pub(super) struct PlyHeader {
+    pub encoding: PlyEncoding,
     pub elements: Vec<Element>,
     /// Offset of the first byte behind the header.
     pub body: usize,
@@ -65,11 +65,11 @@ fn scalar(name: &[u8]) -> Option<Scalar> {
     })
 }
 
-impl Header {
+impl PlyHeader {
     /// # Errors
     /// [`FormatError`] with the line that cannot be understood.
     pub fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
-        let mut lines = Lines::of_header(bytes);
+        let mut lines = ByteLines::of_header(bytes);
         if lines.next().is_none_or(|line| line.text.trim_ascii() != b"ply") {
             return Err(FormatError::Content("the file does not begin with a line `ply`".into()));
         }
@@ -111,11 +111,11 @@ fn not_understood(line: &Line) -> FormatError {
     line.error(format!("{} is not a line of a PLY header", quote(line.text.trim_ascii())))
 }
 
-fn parse_encoding(line: &Line, name: &[u8]) -> Result<Encoding, FormatError> {
+fn parse_encoding(line: &Line, name: &[u8]) -> Result<PlyEncoding, FormatError> {
     match name {
-        b"ascii" => Ok(Encoding::Ascii),
-        b"binary_little_endian" => Ok(Encoding::Binary { big_endian: false }),
-        b"binary_big_endian" => Ok(Encoding::Binary { big_endian: true }),
+        b"ascii" => Ok(PlyEncoding::Ascii),
+        b"binary_little_endian" => Ok(PlyEncoding::Binary { big_endian: false }),
+        b"binary_big_endian" => Ok(PlyEncoding::Binary { big_endian: true }),
         _ => Err(line.error(format!(
             "the format {} is none of ascii, binary_little_endian, binary_big_endian",
             quote(name)

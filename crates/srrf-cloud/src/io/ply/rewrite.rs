@@ -6,11 +6,11 @@ use std::ops::Range;
 use super::super::scalar::Scalar;
 use super::super::scan::{Splice, moved, put_number, turned};
 use super::body::{Cursor, read};
-use super::header::{Encoding, Header};
+use super::header::{PlyEncoding, PlyHeader};
 use crate::Rigid;
 
 /// What happens to one property of `vertex`.
-struct Change {
+struct PlyChange {
     property: usize,
     /// The triple and the axis in it.
     triple: usize,
@@ -23,23 +23,23 @@ struct Change {
 /// `double`.
 pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
     let points = read(bytes)?;
-    let header = Header::parse(bytes)?;
+    let header = PlyHeader::parse(bytes)?;
     let (mut cursor, element, _) = Cursor::at_vertices(bytes, &header)?;
     let Some(axes) = element.triple(["x", "y", "z"]) else { return Err(io::ErrorKind::InvalidData.into()) };
     let normals = element.triple(["nx", "ny", "nz"]);
     let new_points: Vec<[f64; 3]> = points.iter().map(|&p| moved(motion, p)).collect();
     let scalar = |property: usize| element.properties[property].scalar;
 
-    let mut changes: Vec<Change> = (0..3)
+    let mut changes: Vec<PlyChange> = (0..3)
         .map(|axis| {
             let kind = scalar(axes[axis]).for_moved(axis, &points, &new_points);
-            Change { property: axes[axis], triple: 0, axis, kind }
+            PlyChange { property: axes[axis], triple: 0, axis, kind }
         })
         .collect();
     for axis in 0..3 {
         if let Some(normals) = normals {
             let kind = scalar(normals[axis]).for_turned();
-            changes.push(Change { property: normals[axis], triple: 1, axis, kind });
+            changes.push(PlyChange { property: normals[axis], triple: 1, axis, kind });
         }
     }
     changes.sort_by_key(|change| change.property);
@@ -72,9 +72,9 @@ pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::
             number.clear();
             match header.encoding {
                 _ if same && change.kind == scalar(change.property) => continue,
-                Encoding::Ascii if same => continue,
-                Encoding::Ascii => put_number(&mut number, new),
-                Encoding::Binary { big_endian } => change.kind.put(new, big_endian, &mut number),
+                PlyEncoding::Ascii if same => continue,
+                PlyEncoding::Ascii => put_number(&mut number, new),
+                PlyEncoding::Binary { big_endian } => change.kind.put(new, big_endian, &mut number),
             }
             failed = splice.replace(places[change.property].clone(), &number);
             if failed.is_err() {

@@ -4,8 +4,8 @@ mod row;
 
 use std::io::{self, Write};
 
-use self::row::{Row, Style};
-use super::scan::{Line, Lines, Splice, moved, write_rows};
+use self::row::{Style, TextRow};
+use super::scan::{ByteLines, Line, Splice, moved, write_rows};
 use super::{CloudFormat, FormatError};
 use crate::Rigid;
 
@@ -78,7 +78,7 @@ impl CloudFormat for Text {
 /// Goes through the points; the number of them that the first line announces.
 fn parse<E: From<FormatError>>(
     bytes: &[u8],
-    mut each: impl FnMut(&Line, Row) -> Result<(), E>,
+    mut each: impl FnMut(&Line, TextRow) -> Result<(), E>,
 ) -> Result<Option<usize>, E> {
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err(FormatError::Content("the text is UTF-16; save it as UTF-8 or ASCII".into()).into());
@@ -88,7 +88,7 @@ fn parse<E: From<FormatError>>(
     let mut title: Option<Line> = None;
     let mut rows = 0usize;
     let mut whole = None;
-    for mut line in Lines::new(bytes) {
+    for mut line in ByteLines::new(bytes) {
         if line.number == 1 && line.text.starts_with("\u{feff}".as_bytes()) {
             line = Line { start: 3, text: &line.text[3..], ..line };
         }
@@ -116,7 +116,7 @@ fn parse<E: From<FormatError>>(
         if rows == 0 {
             columns = title.and_then(|title| named_columns(title.text, line.text)).unwrap_or(columns);
         }
-        let row = Row::parse(line.text, columns).map_err(|problem| line.error(problem))?;
+        let row = TextRow::parse(line.text, columns).map_err(|problem| line.error(problem))?;
         if let Some(count) = row.whole_numbers(line.text)
             && *whole.get_or_insert(count) != count
         {
@@ -161,7 +161,7 @@ fn named_columns(title: &[u8], first: &[u8]) -> Option<[usize; 3]> {
 
 /// The first three numbers of a line.
 pub fn parse_point(line: &str) -> Result<[f64; 3], String> {
-    Row::parse(line.as_bytes(), [0, 1, 2]).map(|row| row.point)
+    TextRow::parse(line.as_bytes(), [0, 1, 2]).map(|row| row.point)
 }
 
 #[cfg(test)]

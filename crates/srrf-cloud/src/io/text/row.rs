@@ -78,14 +78,14 @@ fn unquoted((at, word): (usize, &[u8])) -> (usize, &[u8]) {
 }
 
 /// The point of a line.
-pub(super) struct Row {
+pub(super) struct TextRow {
     pub style: Style,
     /// Where its numbers are in the line.
     pub places: [Range<usize>; 3],
     pub point: [f64; 3],
 }
 
-impl Row {
+impl TextRow {
     /// Reads x, y and z from the fields number `columns`, counted from 0.
     ///
     /// # Errors
@@ -137,7 +137,7 @@ mod tests {
     use super::*;
 
     fn point(text: &str) -> Result<[f64; 3], String> {
-        Row::parse(text.as_bytes(), [0, 1, 2]).map(|row| row.point)
+        TextRow::parse(text.as_bytes(), [0, 1, 2]).map(|row| row.point)
     }
 
     #[test]
@@ -159,7 +159,7 @@ mod tests {
         ] {
             assert_eq!(point(text), expected, "{text}");
         }
-        let row = Row::parse(b"7 ; 1,5;\"-2\"; 3", [1, 2, 3]).unwrap();
+        let row = TextRow::parse(b"7 ; 1,5;\"-2\"; 3", [1, 2, 3]).unwrap();
         assert_eq!((row.point, row.places), ([1.5, -2.0, 3.0], [4..7, 9..11, 14..15]));
     }
 
