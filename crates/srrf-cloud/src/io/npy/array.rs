@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::DOUBLE;
-use super::header::{Descr, Header};
+use super::header::{Descr, NpyHeader};
 use crate::io::FormatError;
 
 /// Numbers with a shape, in row-major (C) order whatever the file's order was.
@@ -22,7 +22,7 @@ impl Array {
     /// # Errors
     /// [`FormatError`] where the bytes are no such array.
     pub fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
-        let header = Header::parse(bytes)?;
+        let header = NpyHeader::parse(bytes)?;
         let Descr::Plain(kind) = header.descr else {
             return Err(FormatError::Content(
                 "an array of records cannot be read here; save each field as an array of float32 or float64"
@@ -55,7 +55,7 @@ impl Array {
     /// Those of `out`.
     pub fn write(shape: &[usize], values: &[f64], out: &mut dyn Write) -> io::Result<()> {
         let shape: Vec<u64> = shape.iter().map(|&axis| axis as u64).collect();
-        out.write_all(&Header::bytes(&Descr::Plain(DOUBLE), false, &shape))?;
+        out.write_all(&NpyHeader::bytes(&Descr::Plain(DOUBLE), false, &shape))?;
         values.iter().try_for_each(|value| out.write_all(&value.to_le_bytes()))
     }
 }
