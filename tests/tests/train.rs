@@ -145,17 +145,123 @@ fn bad_configurations_are_refused_by_key() {
     for (from, to, words) in [
         ("seed = 3", "seed = 3\nsede = 4", &["bad.toml", "unknown field `sede`"][..]),
         ("batch = 8", "batch = 7", &["bad.toml", "optimizer.batch", "multiple"][..]),
-        ("severities = [1, 3, 5]", "severities = [9]", &["bad.toml", "draw.severities", "1 to 5"][..]),
+        (
+            "severities = [1, 3, 5]",
+            "severities = [9]",
+            &["bad.toml", "draw.severities[0]", "between 1 and 5"][..],
+        ),
         ("clean = 0.1", "clean = 1.5", &["bad.toml", "draw.clean", "between 0 and 1"][..]),
         ("epochs = 2.4", "epochs = -1", &["bad.toml", "stages[2].epochs"][..]),
         ("heads = 2, mlp", "heads = 3, mlp", &["bad.toml", "sfe.heads", "divide"][..]),
-        ("seed = 3", "seed = 3\nreduce = \"collective\"", &["reduce", "cuda only", "`flex`", "ordered"][..]),
+        ("name = \"smoke\"", "name = \"..\"", &["bad.toml", "`name`", "file name"][..]),
+        ("weight_decay = 1e-4", "weight_decay = nan", &["bad.toml", "optimizer.weight_decay", "NaN"][..]),
+        ("clip_norm = 1.0", "clip_norm = nan", &["bad.toml", "optimizer.clip_norm", "NaN"][..]),
+        ("clip_norm = 1.0", "clip_norm = inf", &["bad.toml", "optimizer.clip_norm", "inf"][..]),
+        ("beta_2 = 0.999", "beta_2 = 2", &["bad.toml", "optimizer.beta_2", "less than 1"][..]),
+        ("residual_translation = 0.1", "residual_translation = 1e308", &["draw.residual_translation"][..]),
+        (
+            "of_epochs = 250.0",
+            "of_epochs = 0",
+            &["stages[2].schedule.milestones.of_epochs", "more than 0"][..],
+        ),
+        ("batch = 8", "batch = 80000000", &["bad.toml", "optimizer.batch", "between 1 and"][..]),
+        ("shapes = 48", "shapes = 480000000000", &["bad.toml", "data.shapes", "between 1 and"][..]),
+        ("points = 128", "points = 1280000000", &["bad.toml", "pairs.points", "between 3 and"][..]),
+        ("width = 8, heads", "width = 8000000, heads", &["network.dense.sfe.width", "between 1 and"][..]),
+        ("layers = 2", "layers = 2000000", &["network.dense.sfe.layers", "between 1 and"][..]),
+        ("learning_rate = 1e-3", "learning_rate = nan", &["stages[0].learning_rate", "NaN"][..]),
         ("kind = \"adam\"", "kind = \"lion\"", &["bad.toml", "unknown variant `lion`"][..]),
     ] {
         assert!(text.contains(from), "{from}");
         std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
         refuses("srrf-train", &arguments, words);
     }
+}
+
+#[test]
+fn a_configuration_may_say_only_what_it_changes() {
+    let scratch = tempfile::tempdir().unwrap();
+    let base = srrf_tests::workspace().join(CONFIG);
+    let small = scratch.path().join("small.toml");
+    let arguments = ["--config", small.to_str().unwrap()];
+    let extends = format!("extends = {base:?}\n");
+    for (more, words) in [
+        ("sede = 4\n", &["small.toml", "`sede`", "unknown field"][..]),
+        ("[draw]\nclean = 1.5\n", &["small.toml", "draw.clean", "between 0 and 1"][..]),
+        ("[network.dense]\ntokens = \"all\"\n", &["small.toml", "network.dense.tokens", "invalid type"][..]),
+        ("[optimizer]\nbatch = 9\n", &["small.toml", "optimizer.batch", "multiple"][..]),
+    ] {
+        std::fs::write(&small, format!("{extends}{more}")).unwrap();
+        refuses("srrf-train", &arguments, words);
+    }
+    std::fs::write(&small, "extends = \"small.toml\"\n").unwrap();
+    refuses("srrf-train", &arguments, &["small.toml", "extends itself"]);
+    std::fs::write(&small, "extends = \"nothing.toml\"\n").unwrap();
+    refuses("srrf-train", &arguments, &["small.toml", "nothing.toml", "No such file"]);
+
+    // What runs is the whole, and is written down so.
+    std::fs::write(&small, format!("{extends}name = \"small\"\n[optimizer]\nbatch = 4\n")).unwrap();
+    let run_folder = scratch.path().join("run");
+    let folder = run_folder.to_str().unwrap();
+    let (code, said) = run("srrf-train", &["--config", arguments[1], "--run", folder, "--until-step", "1"]);
+    assert_eq!(code, 0, "{said}");
+    let resolved = std::fs::read_to_string(run_folder.join("config.toml")).unwrap();
+    assert!(resolved.contains("batch = 4") && resolved.contains("skeleton_points = 12"), "{resolved}");
+    assert!(!resolved.contains("extends"), "{resolved}");
+}
+
+#[test]
+fn a_restart_that_cannot_begin_harms_nothing() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path().join("run");
+    train(&folder, &["--until-step", "2"]);
+    let before = parameters(&folder);
+    let text = std::fs::read_to_string(srrf_tests::workspace().join(CONFIG)).unwrap();
+    let wrong = scratch.path().join("wrong.toml");
+    std::fs::write(&wrong, text.replacen("seed = 3", "seed = 3\nstart = \"no/such.safetensors\"", 1))
+        .unwrap();
+    let path = folder.to_str().unwrap();
+    let arguments = ["--config", wrong.to_str().unwrap(), "--run", path, "--restart"];
+    refuses("srrf-train", &arguments, &["start", "no/such.safetensors"]);
+    assert!(parameters(&folder) == before);
+    for file in ["last.safetensors", "metrics.jsonl", "config.toml"] {
+        assert!(folder.join(file).exists(), "{file}");
+    }
+    // One that begins replaces it, and leaves nothing behind.
+    train(&folder, &["--until-step", "1", "--restart"]);
+    assert!(parameters(&folder) != before);
+    assert!(!folder.join("before-restart").exists());
+}
+
+#[test]
+fn minutes_and_threads_have_a_range() {
+    for (flag, value) in [
+        ("--minutes", "1e300"),
+        ("--minutes", "nan"),
+        ("--minutes", "-1"),
+        ("--threads", "0"),
+        ("--threads", "1000000"),
+    ] {
+        refuses("srrf-train", &["--config", CONFIG, &format!("{flag}={value}")], &[flag, value]);
+    }
+    // No time at all is time for no step, and is said so.
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path().join("run");
+    let arguments = ["--config", CONFIG, "--run", folder.to_str().unwrap(), "--minutes", "0"];
+    let (code, said) = run("srrf-train", &arguments);
+    assert!(code == 0 && said.contains("no step was done") && said.contains("step 0"), "{code}: {said}");
+}
+
+#[test]
+fn data_that_a_configuration_does_not_train_on_are_refused() {
+    let scratch = tempfile::tempdir().unwrap();
+    let [data, folder] = ["data", "run"].map(|name| scratch.path().join(name).to_str().unwrap().to_string());
+    let arguments = ["--config", CONFIG, "--run", &folder, "--until-step", "0"];
+    let with_data = [&arguments[..], &["--data", &data]].concat();
+    refuses("srrf-train", &with_data, &["--data", "built-in shapes", "modelnet"]);
+    // The environment is for whoever asks for it.
+    let output = program("srrf-train").args(arguments).env("SRRF_DATA", &data).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]

@@ -9,10 +9,10 @@ use burn::tensor::{Device, Tensor};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::ops::even_tokens;
-use srrf_model::{CopyError, NetworkConfig, WrongSize, procrustes, registration_loss, soft_matches};
+use srrf_model::{CopyError, NetworkConfig, WrongSize, procrustes, registration_loss, soft_matches, TrainingBatch};
 
 use crate::dgcnn::{Dgcnn, halves};
-use crate::learned::{LearnedConfig, Lesson, Pose};
+use crate::learned::{LearnedConfig, Pose};
 use crate::pre_norm::Transformer;
 
 /// Which DCP.
@@ -135,10 +135,10 @@ impl LearnedConfig for DcpConfig {
         &self,
         losses: &DcpLosses,
         network: &Dcp,
-        lesson: &Lesson,
+        batch: &TrainingBatch,
     ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError> {
-        let found = self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase)?;
-        let (rotation, translation) = (lesson.rotation.clone(), lesson.translation.clone());
+        let found = self.forward(network, batch.source.clone(), batch.target.clone(), batch.phase)?;
+        let (rotation, translation) = (batch.rotation.clone(), batch.translation.clone());
         let loss = registration_loss(found.rotation, found.translation, rotation, translation);
         Ok(vec![("registration", loss, losses.registration)])
     }

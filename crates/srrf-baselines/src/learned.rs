@@ -9,25 +9,10 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use srrf_cloud::{Register, RegisterError, Registration, Solid};
 use srrf_model::weights::LoadedModel;
-use srrf_model::{CopyError, NetworkConfig, PairBatch, subsample};
+use srrf_model::{CopyError, NetworkConfig, PairBatch, TrainingBatch, subsample};
 
 /// Largest number of points that a network sees of a cloud: what it was trained with.
 const MAX_POINTS: usize = 1024;
-
-/// Pairs to learn from, in network units (see [`PairBatch`]).
-#[derive(Debug, Clone)]
-pub struct Lesson {
-    /// `[batch, points, 3]`.
-    pub source: Tensor<3>,
-    /// `[batch, points, 3]`.
-    pub target: Tensor<3>,
-    /// The true rotation, `[batch, 3, 3]`.
-    pub rotation: Tensor<3>,
-    /// The true translation, `[batch, 3]`.
-    pub translation: Tensor<2>,
-    /// In [0, 1): which points carry tokens, in networks that take not all of them.
-    pub phase: f32,
-}
 
 /// Poses: `target ~ R source + t`.
 #[derive(Debug, Clone)]
@@ -56,7 +41,7 @@ pub trait LearnedConfig: NetworkConfig + JsonSchema {
         &self,
         losses: &Self::Losses,
         network: &Self::Network,
-        lesson: &Lesson,
+        batch: &TrainingBatch,
     ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError>;
 
     /// The answer, as at inference.

@@ -29,5 +29,5 @@ learned_baselines! {
     equi_gspr::EquiGsprConfig, weights "equi-gspr";
 }
 
-pub use learned::{LearnedConfig, LearnedRegister, Lesson, Pose};
+pub use learned::{LearnedConfig, LearnedRegister, Pose};
 pub use list::{BaselineEntry, BaselineVisitor, TrainedWeights, embedded};

@@ -15,10 +15,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
 use srrf_model::ops::{HostClouds, even_tokens, flat_indices, k_nearest, rows};
-use srrf_model::{CopyError, NetworkConfig, WrongSize, transform};
+use srrf_model::{CopyError, NetworkConfig, WrongSize, transform, TrainingBatch};
 
 use crate::dgcnn::{Block, max_over};
-use crate::learned::{LearnedConfig, Lesson, Pose};
+use crate::learned::{LearnedConfig, Pose};
 use crate::se3::{compose, rotation_of};
 
 /// Sizes of [`Panet`]. Defaults are those of the authors' code.
@@ -215,12 +215,12 @@ impl LearnedConfig for PanetConfig {
         &self,
         losses: &PanetLosses,
         network: &Panet,
-        lesson: &Lesson,
+        batch: &TrainingBatch,
     ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError> {
         let Pose { rotation, translation } =
-            self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase)?;
-        let found = transform(lesson.source.clone(), rotation, translation);
-        let wanted = transform(lesson.source.clone(), lesson.rotation.clone(), lesson.translation.clone());
+            self.forward(network, batch.source.clone(), batch.target.clone(), batch.phase)?;
+        let found = transform(batch.source.clone(), rotation, translation);
+        let wanted = transform(batch.source.clone(), batch.rotation.clone(), batch.translation.clone());
         Ok(vec![("points", (found - wanted).abs().mean(), losses.points)])
     }
 

@@ -8,13 +8,13 @@ use burn::module::Module;
 use burn::optim::{AdamConfig, GradientsParams};
 use burn::tensor::{Device, Tensor, TensorData};
 use srrf_baselines::{
-    DcpConfig, DcpLosses, DcpVersion, EquiGsprConfig, EquiGsprLosses, LearnedConfig, LearnedRegister, Lesson,
+    DcpConfig, DcpLosses, DcpVersion, EquiGsprConfig, EquiGsprLosses, LearnedConfig, LearnedRegister,
     LkJacobian, PanetConfig, PanetLosses, PointNetLkConfig, PointNetLkLosses, RgmConfig, RgmLosses,
 };
 use srrf_cloud::{EulerXyz, PointCloud, Register, Rigid};
 use srrf_corrupt::datasets::ShapeSource;
 use srrf_corrupt::shapes::ProceduralShapes;
-use srrf_model::{NetworkConfig, PairBatch, init, weights};
+use srrf_model::{NetworkConfig, PairBatch, TrainingBatch, init, weights};
 
 const POINTS: usize = 97;
 /// More than there are: every point is a token.
@@ -100,13 +100,11 @@ fn cloud(shapes: &ProceduralShapes, index: usize) -> PointCloud {
     shapes.sample(index, POINTS, &mut rand::rngs::ChaCha8Rng::seed_from_u64(7)).unwrap()
 }
 
-fn lesson(device: &Device) -> Lesson {
+fn training_batch(device: &Device) -> TrainingBatch {
     let pairs = pairs();
     let clouds: Vec<(&PointCloud, &PointCloud)> = pairs.iter().map(|(s, t, _)| (s, t)).collect();
     let poses: Vec<Rigid> = pairs.iter().map(|(_, _, pose)| *pose).collect();
-    let batch = PairBatch::new(&clouds, device).unwrap();
-    let (rotation, translation) = batch.truth(&poses);
-    Lesson { source: batch.source, target: batch.target, rotation, translation, phase: 0.3 }
+    TrainingBatch::new(&PairBatch::new(&clouds, device).unwrap(), &poses, 0.3)
 }
 
 fn values<const D: usize>(tensor: &Tensor<D>) -> Vec<f64> {
@@ -123,7 +121,7 @@ fn answers<C: LearnedConfig>(config: &C) {
     let device = Device::flex();
     config.check().unwrap();
     let network = init::seeded(config.init(&device), 3);
-    let Lesson { source, target, .. } = lesson(&device);
+    let TrainingBatch { source, target, .. } = training_batch(&device);
     let pose = config.pose(&network, source.clone(), target.clone()).unwrap();
     assert_eq!((pose.rotation.dims(), pose.translation.dims()), ([3, 3, 3], [3, 3]));
     let square = pose.rotation.clone().matmul(pose.rotation.clone().transpose());
@@ -145,13 +143,13 @@ fn answers<C: LearnedConfig>(config: &C) {
 /// The sum of the losses falls to `share` of what it was within `steps`.
 fn learns<C: LearnedConfig>((config, losses): &(C, C::Losses), rate: f64, steps: usize, share: f64) {
     let device = Device::flex();
-    let lesson = lesson(&device);
+    let batch = training_batch(&device);
     let mut network = init::seeded(config.init(&device), 3);
     let mut adam = AdamConfig::new().init();
     let mut course = Vec::new();
     for _ in 0..steps {
         let learning = network.train();
-        let terms = config.losses(losses, &learning, &lesson).unwrap();
+        let terms = config.losses(losses, &learning, &batch).unwrap();
         assert_eq!(terms.iter().map(|t| t.0).collect::<Vec<_>>(), C::TERMS);
         let total = terms.into_iter().map(|(_, value, weight)| value * weight).reduce(|a, b| a + b).unwrap();
         course.push(total.clone().into_scalar::<f64>());
@@ -209,7 +207,7 @@ fn pointnetlk_with_both_jacobians() {
 
         // Equal clouds have equal features: nothing moves.
         let device = Device::flex();
-        let source = lesson(&device).source;
+        let source = training_batch(&device).source;
         let network = init::seeded(both.0.init(&device), 3);
         let pose = both.0.pose(&network, source.clone(), source).unwrap();
         assert!(values(&pose.translation).iter().all(|v| v.abs() < 1e-6));
@@ -242,7 +240,7 @@ fn equi_gspr_style() {
     // A turned source gives the same matches, with the same features: the pose turns along.
     let device = Device::flex();
     let network = init::seeded(both.0.init(&device), 3);
-    let Lesson { source, target, .. } = lesson(&device);
+    let TrainingBatch { source, target, .. } = training_batch(&device);
     let turn = EulerXyz::from_deg([70.0, -40.0, 110.0]).to_matrix();
     let turn: Vec<f64> = turn.transpose().iter().copied().collect();
     let turn = Tensor::<3>::from_data(TensorData::new(turn, [1, 3, 3]), &device).repeat_dim(0, 3);

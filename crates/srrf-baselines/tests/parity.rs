@@ -28,9 +28,9 @@ use common::{Numbers, difference, values};
 use parameters::{Directions, Fill};
 use serde::Deserialize;
 use srrf_baselines::{
-    DcpConfig, EquiGsprConfig, LearnedConfig, Lesson, PanetConfig, PointNetLkConfig, Pose, PutativeMatches,
-    RgmConfig,
+    DcpConfig, EquiGsprConfig, LearnedConfig, PanetConfig, PointNetLkConfig, Pose, PutativeMatches, RgmConfig,
 };
+use srrf_model::TrainingBatch;
 
 /// The types to run in, with the tolerances of values and of gradients.
 const EXACT: (DType, f64, f64) = (DType::F64, 1e-7, 1e-5);
@@ -67,8 +67,8 @@ impl Reference {
         Tensor::from_data(TensorData::new(data, shape), (&Device::flex(), self.dtype))
     }
 
-    fn lesson(&self) -> Lesson {
-        Lesson {
+    fn given(&self) -> TrainingBatch {
+        TrainingBatch {
             source: self.tensor("source"),
             target: self.tensor("target"),
             rotation: self.tensor("rotation"),
@@ -130,13 +130,13 @@ impl Reference {
 fn holds<C: LearnedConfig>(name: &str, losses: &str, types: [(DType, f64, f64); 2]) {
     for reference in types.map(Reference::new) {
         let (config, network) = reference.network::<C>(name);
-        let lesson = reference.lesson();
-        let pose = config.pose(&network, lesson.source.clone(), lesson.target.clone()).unwrap();
+        let given = reference.given();
+        let pose = config.pose(&network, given.source.clone(), given.target.clone()).unwrap();
         reference.compare_pose(name, &pose);
         let weights = serde_json::from_value(reference.all["losses"][losses].clone()).unwrap();
         let network = network.train();
         let mut total = None;
-        for (term, value, weight) in config.losses(&weights, &network, &lesson).unwrap() {
+        for (term, value, weight) in config.losses(&weights, &network, &given).unwrap() {
             reference.compare(&format!("{name}.loss.{term}"), &value);
             let value = value * weight;
             total = Some(total.map_or(value.clone(), |sum: Tensor<1>| sum + value));
@@ -180,8 +180,8 @@ fn rgm() {
 fn equi_gspr_from_given_matches() {
     for reference in [EXACT, SINGLE].map(Reference::new) {
         let (config, network) = reference.network::<EquiGsprConfig>("equi_gspr");
-        let lesson = reference.lesson();
-        let [batch, points, _] = lesson.source.dims();
+        let given = reference.given();
+        let [batch, points, _] = given.source.dims();
         // Descriptors: drawn, and the same with noise.
         let count = batch * points * PutativeMatches::WIDTH;
         let drawn = Numbers(reference.get("equi_gspr.descriptor_seed")).many(2 * count);
@@ -191,15 +191,15 @@ fn equi_gspr_from_given_matches() {
         };
         let noisy = (0..count).map(|i| drawn[i] + 0.3 * drawn[count + i]).collect();
         let matches = PutativeMatches {
-            source: lesson.source.clone(),
-            target: lesson.target.clone(),
+            source: given.source.clone(),
+            target: given.target.clone(),
             source_features: descriptors(drawn[..count].to_vec()),
             target_features: descriptors(noisy),
         };
         reference.compare_pose("equi_gspr", &config.pose_of(&network, matches.clone()).unwrap());
         let network = network.train();
         let pose = config.pose_of(&network, matches).unwrap();
-        let loss = (pose.rotation * lesson.rotation).sum() + pose.translation.sum();
+        let loss = (pose.rotation * given.rotation).sum() + pose.translation.sum();
         reference.compare_gradients("equi_gspr", &network, loss);
     }
 }

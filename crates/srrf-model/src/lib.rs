@@ -32,6 +32,7 @@ mod sfe;
 mod sizes;
 mod srrf;
 mod timing;
+mod training_batch;
 pub mod weights;
 
 pub use batch::{HostPairs, PairBatch, network_frame};
@@ -58,3 +59,4 @@ pub use sem::{LevelConfig, Sem, SemConfig, SemLayout, Skeleton};
 pub use sfe::{Neighbourhood, Sfe, SfeConfig};
 pub use sizes::{NetworkConfig, WrongSize};
 pub use srrf::{BranchKind, Srrf, SrrfConfig, SrrfLayout, SrrfOutput};
+pub use training_batch::TrainingBatch;

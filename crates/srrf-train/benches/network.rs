@@ -19,7 +19,7 @@ use srrf_model::ops::{even_subsample, farthest_points, k_nearest, nearest, share
 use srrf_model::{
     BranchConfig, PairBatch, SoftMatching, Srrf, SrrfConfig, SrrfOutput, init, keep_freed_memory, procrustes,
 };
-use srrf_train::config::TrainConfig;
+use srrf_train::TrainConfig;
 
 const PHASE: f32 = 0.5;
 const BRANCHES: [&str; 2] = ["dense", "skeleton"];

@@ -13,7 +13,7 @@ use srrf_model::init;
 use srrf_model::weights::{WeightsError, parameters, with_parameters, write_atomically};
 
 use crate::config::TrainConfig;
-use crate::network::Trained;
+use crate::seam::Trained;
 
 /// How the optimiser's state is laid out: by rows of parts (`crate::rows`).
 const FORMAT: &str = "rows-1";
@@ -42,6 +42,15 @@ pub enum CheckpointError {
         path: PathBuf,
         /// What is wrong.
         why: String,
+    },
+    /// A parameter is no number any more.
+    #[error(
+        "`{name}` is not finite any more: the run diverged, and its last checkpoint is from before. Lower \
+         `learning_rate` or `optimizer.clip_norm`"
+    )]
+    NotFinite {
+        /// The parameter.
+        name: String,
     },
     /// The checkpoint belongs to another configuration.
     #[error(
@@ -75,7 +84,7 @@ pub struct Progress {
 /// Writes the checkpoint of `folder`.
 ///
 /// # Errors
-/// [`CheckpointError::Write`]; the old checkpoint is then unharmed.
+/// [`CheckpointError::Write`] or [`CheckpointError::NotFinite`]; the old checkpoint is then unharmed.
 pub fn save<C: Trained>(
     folder: &Path,
     config: &TrainConfig<C>,
@@ -85,8 +94,14 @@ pub fn save<C: Trained>(
 ) -> Result<(), CheckpointError> {
     let path = folder.join(FILE);
     let broken = |why: String| CheckpointError::Broken { path: path.clone(), why };
-    let mut tensors: Vec<(String, Dtype, Vec<usize>, Vec<u8>)> = parameters(model)
-        .map_err(|source| WeightsError::Copy { origin: "the network".into(), source })?
+    let parameters =
+        parameters(model).map_err(|source| WeightsError::Copy { origin: "the network".into(), source })?;
+    if let Some((name, _)) =
+        parameters.iter().find(|(_, (_, values))| values.iter().any(|value| !value.is_finite()))
+    {
+        return Err(CheckpointError::NotFinite { name: name.clone() });
+    }
+    let mut tensors: Vec<(String, Dtype, Vec<usize>, Vec<u8>)> = parameters
         .into_iter()
         .map(|(name, (shape, values))| {
             let bytes = values.iter().flat_map(|v| v.to_le_bytes()).collect();
@@ -137,14 +152,8 @@ pub fn load<C: Trained>(
         return Err(broken("written by another version of this program".into()));
     }
     let progress: Progress = serde_json::from_str(entry("progress")?).map_err(|e| broken(e.to_string()))?;
-    let mut saved: serde_json::Value =
-        serde_json::from_str(entry("config")?).map_err(|e| broken(e.to_string()))?;
-    let mut wanted = serde_json::to_value(config).map_err(|e| broken(e.to_string()))?;
-    // A run may go on on other devices.
-    for config in [&mut saved, &mut wanted].into_iter().filter_map(|config| config.as_object_mut()) {
-        config.remove("device");
-        config.remove("reduce");
-    }
+    let (saved, wanted) =
+        comparable(entry("config")?, config).map_err(|e: serde_json::Error| broken(e.to_string()))?;
     if let Some(key) = first_difference(&saved, &wanted, String::new()) {
         return Err(CheckpointError::OtherConfig { path, why: format!("`{key}` differs") });
     }
@@ -165,6 +174,27 @@ pub fn load<C: Trained>(
     let model = with_parameters(model, values).map_err(|(name, why)| broken(format!("`{name}`: {why}")))?;
     let optimizer = optimizer.from_bytes(state).map_err(|e| broken(e.to_string()))?;
     Ok(Some((model.valid(), optimizer, progress)))
+}
+
+/// The configuration of a checkpoint and that of the run in one spelling, without the devices, for a run may go on on
+/// others.
+fn comparable<C: Trained>(
+    saved: &str,
+    config: &TrainConfig<C>,
+) -> Result<(serde_json::Value, serde_json::Value), serde_json::Error> {
+    let mut saved: serde_json::Value = serde_json::from_str(saved)?;
+    if let Some(saved) = saved.as_object_mut() {
+        saved.remove("reduce"); // of version 0.1.0, which changed nothing in what was computed
+    }
+    // Older spellings of a key are read as the newer ones; what is no configuration any more stays as it is.
+    if let Ok(read) = serde_json::from_value::<TrainConfig<C>>(saved.clone()) {
+        saved = serde_json::to_value(read)?;
+    }
+    let mut wanted = serde_json::to_value(config)?;
+    for config in [&mut saved, &mut wanted].into_iter().filter_map(|config| config.as_object_mut()) {
+        config.remove("device");
+    }
+    Ok((saved, wanted))
 }
 
 /// Path of the first entry in which two JSON values differ.

@@ -32,7 +32,7 @@ pub struct Arguments {
     #[command(subcommand)]
     pub command: Option<Command>,
 
-    /// The configuration; see configs/
+    /// The configuration; see configs/, and `srrf-train keys` for what it may hold
     #[arg(long, value_name = value::FILE, required = true)]
     pub config: Option<PathBuf>,
 
@@ -48,7 +48,7 @@ pub struct Arguments {
     #[arg(long, conflicts_with = "restart")]
     pub resume: bool,
 
-    /// Start over, whatever the run's folder holds
+    /// Start over; the old run goes when the new one has its first checkpoint
     #[arg(long)]
     pub restart: bool,
 
@@ -81,6 +81,8 @@ pub struct Arguments {
 /// What the program does beside training.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// The reference of all keys of a configuration, as Markdown
+    Keys,
     /// Completions and manual pages
     #[command(flatten)]
     Scripts(Scripts),

@@ -17,7 +17,7 @@ use srrf_corrupt::{
 };
 
 use crate::config::{DataSource, DrawConfig, TrainConfig};
-use crate::network::Trained;
+use crate::seam::Trained;
 
 /// What a user without the data may do.
 const WITHOUT: &str = "to train without a download: srrf-train --config configs/shapes.toml";
@@ -31,6 +31,12 @@ pub enum ShapesError {
          {ACCEPTED_LAYOUTS}\n{WITHOUT}"
     )]
     NoPath,
+    /// The configuration wants built-in shapes, and somebody said where others are.
+    #[error(
+        "this configuration trains on built-in shapes, and --data names others: leave --data out, or write \
+         `data.source = \"modelnet\"`, which takes any of the layouts. {ACCEPTED_LAYOUTS}"
+    )]
+    NotAsked,
     /// It cannot be read.
     #[error("{0}\n{WITHOUT}")]
     Unreadable(#[source] SourceError),
@@ -39,16 +45,20 @@ pub enum ShapesError {
     BuiltIn(SourceError),
 }
 
-/// The shapes that a configuration asks for: built-in ones, or the training split at `data`, which comes before the path
-/// in the configuration.
+/// The shapes that a configuration asks for: built-in ones, or the training split at `data`, which comes before that of
+/// the environment, which comes before the path in the configuration.
 ///
 /// # Errors
 /// [`ShapesError`] where they cannot be had.
 pub fn training_shapes<C: Trained>(
     config: &TrainConfig<C>,
     data: Option<&Path>,
+    environment: Option<&Path>,
 ) -> Result<Box<dyn ShapeSource>, ShapesError> {
-    match (config.data.source, data.or(config.data.path.as_deref())) {
+    if config.data.source == DataSource::Shapes && data.is_some() {
+        return Err(ShapesError::NotAsked);
+    }
+    match (config.data.source, data.or(environment).or(config.data.path.as_deref())) {
         (DataSource::Shapes, _) => match ProceduralShapes::new(config.seed, config.data.shapes, None) {
             Ok(shapes) => Ok(Box::new(shapes)),
             Err(source) => Err(ShapesError::BuiltIn(source)),

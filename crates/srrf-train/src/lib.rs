@@ -1,20 +1,32 @@
 //! Trains the SRRF network and the learned baselines: configuration, pairs, schedule, checkpoints, the
-//! loop. [`network`] is the seam between the loop and what it trains.
+//! loop. [`seam`] is what lies between the loop and what it trains.
 
-pub mod ahead;
-pub mod baseline;
 pub mod checkpoint;
 pub mod cli;
 pub mod config;
 pub mod data;
-pub mod log;
-pub mod network;
+mod error;
+mod export;
+mod folder;
+mod log;
+pub mod nets;
 pub mod optimizer;
-pub mod resources;
+mod options;
+pub mod prefetch;
+mod resources;
 pub mod rows;
 pub mod run;
 pub mod schedule;
-pub mod srrf;
+pub mod seam;
+mod session;
+pub mod stage;
 mod start;
 pub mod step;
-pub mod validate;
+mod validate;
+pub mod workers;
+
+pub use config::TrainConfig;
+pub use error::TrainError;
+pub use options::{Ended, Existing, RunOptions};
+pub use seam::Trained;
+pub use session::{Overrides, train, train_layers};

@@ -8,11 +8,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use plotters::prelude::*;
 use serde_json::{Value, json};
 
-use crate::step::Losses;
+use crate::seam::Losses;
 use crate::validate::Validation;
 
 /// Name of the metrics file in the run's folder.
 pub const FILE: &str = "metrics.jsonl";
+/// Name of the picture of the curves.
+pub const PICTURE: &str = "curve.svg";
 
 /// A run's log file, one JSON object a line.
 pub struct Log {
@@ -99,7 +101,7 @@ impl Log {
         let loss = |name: &'static str| curve("train", &move |l| l["losses"][name].as_f64());
         let losses: Vec<_> = losses.iter().map(|&name| (name, loss(name))).collect();
 
-        let picture = self.path.with_file_name("curve.svg");
+        let picture = self.path.with_file_name(PICTURE);
         let root = SVGBackend::new(&picture, (900, 640)).into_drawing_area();
         root.fill(&WHITE).map_err(|e| e.to_string())?;
         let parts = root.split_evenly((2, 1));
@@ -153,6 +155,43 @@ fn step_of(line: &str) -> Option<usize> {
 
 fn round(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
+}
+
+/// The losses since the last line of the log.
+#[derive(Default)]
+pub struct Window {
+    sums: Losses,
+    steps: usize,
+}
+
+impl Window {
+    /// Adds those of a step; none where it was left out.
+    pub fn add(&mut self, losses: Losses) {
+        self.steps += usize::from(!losses.is_empty());
+        for (name, value) in losses {
+            *self.sums.entry(name).or_insert(0.0) += value;
+        }
+    }
+
+    /// Their means; what follows is a new window.
+    pub fn mean(&mut self) -> Losses {
+        let Self { sums, steps } = std::mem::take(self);
+        sums.into_iter().map(|(name, sum)| (name, sum / steps.max(1) as f64)).collect()
+    }
+}
+
+/// A stretch of training in one line.
+pub fn train_line(
+    stage: &str,
+    epoch: f64,
+    rate: f64,
+    losses: &Losses,
+    batch: usize,
+    bar: &ProgressBar,
+) -> String {
+    let total = losses.get("total").copied().unwrap_or(f64::NAN);
+    let pairs = bar.per_sec() * batch as f64;
+    format!("{stage}  epoch {epoch:.2}  loss {total:.4}  lr {rate:.1e}  {pairs:.1} pairs/s")
 }
 
 /// A validation in one line.

@@ -1,5 +1,6 @@
 //! `srrf-train --config configs/modelnet.toml`: trains the SRRF network, or a learned baseline.
 
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -7,21 +8,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use srrf_args::{Failure, INTERRUPTED, run_program};
-use srrf_baselines::{DcpConfig, EquiGsprConfig, PanetConfig, PointNetLkConfig, RgmConfig};
 use srrf_cloud::profile;
 use srrf_corrupt::datasets::default_data_path;
-use srrf_model::{SrrfConfig, keep_freed_memory};
-use srrf_train::baseline::Baseline;
+use srrf_model::keep_freed_memory;
 use srrf_train::cli::{Arguments, Command, command};
-use srrf_train::config::{TrainConfig, method_of};
-use srrf_train::data::training_shapes;
-use srrf_train::network::Trained;
-use srrf_train::run::{Existing, RunError, RunOptions, run};
+use srrf_train::config::key_reference;
+use srrf_train::{Ended, Existing, Overrides, TrainError, train};
 
 fn main() -> ExitCode {
     keep_freed_memory();
     run_program(|arguments: Arguments| match (&arguments.command, arguments.config.clone()) {
         (Some(Command::Scripts(scripts)), _) => scripts.run(command()),
+        (Some(Command::Keys), _) => keys(),
         (None, Some(config)) => start(arguments, &config),
         (None, None) => Err(Failure::usage("name a configuration: --config FILE".into())),
     })
@@ -32,32 +30,21 @@ fn tell(message: &str) {
     eprintln!("{message}");
 }
 
-/// Trains what the configuration names.
-fn start(arguments: Arguments, path: &Path) -> Result<ExitCode, Failure> {
-    let method = method_of(path).map_err(Failure::input)?;
-    match method.as_str() {
-        SrrfConfig::METHOD => train::<SrrfConfig>(arguments, path),
-        Baseline::<DcpConfig>::METHOD => train::<Baseline<DcpConfig>>(arguments, path),
-        Baseline::<PointNetLkConfig>::METHOD => train::<Baseline<PointNetLkConfig>>(arguments, path),
-        Baseline::<PanetConfig>::METHOD => train::<Baseline<PanetConfig>>(arguments, path),
-        Baseline::<RgmConfig>::METHOD => train::<Baseline<RgmConfig>>(arguments, path),
-        Baseline::<EquiGsprConfig>::METHOD => train::<Baseline<EquiGsprConfig>>(arguments, path),
-        _ => Err(Failure::usage(format!(
-            "{}: `method` is \"{method}\"; choose from srrf, dcp, pointnetlk, panet, rgm, equi-gspr",
-            path.display()
-        ))),
-    }
+/// Writes the reference of all keys.
+fn keys() -> Result<ExitCode, Failure> {
+    let written = std::io::stdout().write_all(key_reference().as_bytes());
+    written
+        .map(|()| ExitCode::SUCCESS)
+        .map_err(|e| Failure::failed(format!("standard output: {e}")).because(e))
 }
 
-fn train<C: Trained>(arguments: Arguments, path: &Path) -> Result<ExitCode, Failure> {
-    let mut config = TrainConfig::<C>::read(path).map_err(Failure::input)?;
-    let name = arguments.device.or(config.device.take()).unwrap_or_else(|| "flex".into());
-    let devices = srrf_model::devices(&name).map_err(Failure::input)?;
-    config.device = Some(name.clone());
-    let data = arguments.data.data.or_else(default_data_path);
-    let shapes = training_shapes(&config, data.as_deref()).map_err(Failure::input)?;
-    let options = RunOptions {
-        folder: arguments.run.unwrap_or_else(|| Path::new("runs").join(&config.name)),
+/// Trains what the configuration names.
+fn start(arguments: Arguments, config: &Path) -> Result<ExitCode, Failure> {
+    let overrides = Overrides {
+        data: arguments.data.data,
+        environment_data: default_data_path(),
+        folder: arguments.run,
+        device: arguments.device,
         threads: arguments.threads.count(),
         existing: match (arguments.resume, arguments.restart) {
             (true, _) => Existing::Resume,
@@ -65,7 +52,7 @@ fn train<C: Trained>(arguments: Arguments, path: &Path) -> Result<ExitCode, Fail
             _ => Existing::Refuse,
         },
         until_step: arguments.until_step,
-        time_limit: arguments.minutes.map(|m| Duration::from_secs_f64(m * 60.0)),
+        time_limit: arguments.minutes.map(|minutes| Duration::from_secs_f64(minutes * 60.0)),
         say: tell,
     };
     let stop = Arc::new(AtomicBool::new(false));
@@ -76,31 +63,26 @@ fn train<C: Trained>(arguments: Arguments, path: &Path) -> Result<ExitCode, Fail
     if arguments.profile.profile {
         profile::start();
     }
-    tell(&format!("config {}, data {}", path.display(), shapes.description()));
-    tell(&format!("run {}, device {}, {} threads", options.folder.display(), name, options.threads));
-    let ended = run(&config, &options, shapes, devices, &stop).map_err(|e| {
-        let input = matches!(
-            e,
-            RunError::Exists { .. }
-                | RunError::Devices { .. }
-                | RunError::Collective(_)
-                | RunError::Checkpoint(_)
-                | RunError::Start { .. }
-                | RunError::StartFile { .. }
-        );
-        if input { Failure::input(e) } else { Failure::other(e) }
-    })?;
+    let ended = train(config, &overrides, &stop).map_err(failure)?;
     if profile::is_on() {
         tell(&profile::report().to_string());
     }
-    let best = ended.best.map_or("none yet".into(), |path| path.display().to_string());
-    tell(&format!("step {}, {} left out as not finite, best weights: {best}", ended.step, ended.skipped));
+    let Ended { step, done, complete, skipped, best } = ended;
+    let best = best.map_or("none yet".into(), |path| path.display().to_string());
+    tell(&format!("step {step}, {skipped} left out as not finite, best weights: {best}"));
     if stop.load(Ordering::Relaxed) {
         tell("stopped; the checkpoint is saved, --resume goes on");
         return Ok(ExitCode::from(INTERRUPTED));
     }
-    if !ended.complete {
+    if !complete && done == 0 && overrides.time_limit.is_some() {
+        tell("no step was done in this time: one takes longer, so give more --minutes");
+    }
+    if !complete {
         tell("not complete; --resume goes on");
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn failure(error: TrainError) -> Failure {
+    if error.is_bad_input() { Failure::input(error) } else { Failure::other(error) }
 }

@@ -4,9 +4,7 @@
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param, ParamId};
 use burn::optim::{GradientsParams, ModuleOptimizer};
-use burn::tensor::distributed::{CollectiveTensor, ReduceOperation, all_reduce};
 use burn::tensor::{Device, Tensor};
-use srrf_model::device_kind;
 use srrf_model::ops::{CopyError, to_host};
 
 /// The parameters of a part as rows, each with its gradient if it has one.
@@ -42,40 +40,6 @@ impl RowGradients {
             Self(a.0.into_iter().zip(b.0).map(both).collect())
         });
         sum.unwrap_or_else(|| Self(Vec::new()))
-    }
-
-    /// The sum over devices, on the first of them, of the one that lies on each, by Burn's own distributed layer
-    /// (NCCL on CUDA): no host in between, and in the order in which the devices finish.
-    pub fn all_reduce(each: Vec<Self>, devices: &[Device]) -> Self {
-        // All are asked before any is waited for: each of them waits for the others.
-        let ask = |row: Tensor<1>| all_reduce(row, ReduceOperation::Sum, devices.to_vec());
-        let ask = |one: Self| one.0.into_iter().map(|row| row.map(ask)).collect::<Vec<_>>();
-        let asked: Vec<_> = each.into_iter().map(ask).collect();
-        // All are waited for, so that no memory is used again that is still being read.
-        let resolve = |one: Vec<Option<CollectiveTensor<1>>>| {
-            Self(one.into_iter().map(|row| row.map(CollectiveTensor::resolve)).collect())
-        };
-        let sums: Vec<_> = asked.into_iter().map(resolve).collect();
-        sums.into_iter().next().unwrap_or_else(|| Self(Vec::new()))
-    }
-
-    /// Whether [`RowGradients::all_reduce`] works on the devices of this name, tried with ones; why not, if not.
-    ///
-    /// # Errors
-    /// A sentence without its full stop.
-    pub fn can_all_reduce(name: &str, devices: &[Device]) -> Result<(), String> {
-        // Burn 0.22 panics elsewhere.
-        if device_kind(name) != "cuda" {
-            return Err(format!("Burn's distributed layer runs on cuda only, and the device is `{name}`"));
-        }
-        let ones = devices.iter().map(|device| Self(vec![Some(Tensor::ones([1], device))])).collect();
-        let sum = Self::all_reduce(ones, devices).norm().map_err(|e| e.to_string())?;
-        match sum == devices.len() as f64 {
-            true => Ok(()),
-            false => Err(format!(
-                "1 from each of `{name}` added up to {sum}; see whether NCCL (libnccl.so) is installed"
-            )),
-        }
     }
 
     /// Euclidean norm over all parts; not finite where any number is not.

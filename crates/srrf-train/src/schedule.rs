@@ -1,7 +1,8 @@
 //! Where a run stands: steps, stages, epochs and the learning rate.
 
-use crate::config::{Schedule, StageConfig, TrainConfig};
-use crate::network::Trained;
+use crate::config::TrainConfig;
+use crate::seam::Trained;
+use crate::stage::{Schedule, StageConfig};
 
 /// The steps of a run.
 #[derive(Debug, Clone)]
@@ -47,7 +48,7 @@ impl Plan {
     }
 
     /// The learning rate of step `step`.
-    pub fn learning_rate(&self, stage: &StageConfig, step: usize) -> f64 {
+    pub fn learning_rate<P>(&self, stage: &StageConfig<P>, step: usize) -> f64 {
         let index = self.stage(step);
         let (first, end) = (self.bounds[index], self.bounds[index + 1]);
         let done = (step - first) as f64 / (end - first) as f64;
@@ -68,17 +69,9 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::SemTraining;
 
-    fn stage(epochs: f64, schedule: Schedule) -> StageConfig {
-        StageConfig {
-            name: "s".into(),
-            epochs,
-            sem: SemTraining::Frozen,
-            registration: true,
-            learning_rate: 1e-3,
-            schedule,
-        }
+    fn stage(epochs: f64, schedule: Schedule) -> StageConfig<()> {
+        StageConfig { name: "s".into(), epochs, trains: (), learning_rate: 1e-3, schedule }
     }
 
     #[test]

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use srrf_corrupt::Pair;
 use srrf_eval::{MetricError, PairError, Scores};
 
-use crate::network::Trained;
-use crate::step::{Workers, to_shard};
+use crate::seam::{Found, Trained};
+use crate::step::to_batch;
+use crate::workers::Workers;
 
 /// Pairs that go through the network together on the CPU.
 pub const CHUNK: usize = 4;
@@ -26,12 +27,12 @@ pub enum ValidateError {
     /// The scorer refused.
     #[error(transparent)]
     Metric(#[from] MetricError),
-    /// The pairs differ in size, or a worker stopped.
-    #[error("the validation pairs could not be run through the network")]
-    Failed,
     /// The device did not give its numbers.
     #[error(transparent)]
     Copy(#[from] srrf_model::CopyError),
+    /// The pairs differ in size, or a worker stopped.
+    #[error("the validation pairs could not be run through the network")]
+    Failed,
 }
 
 /// Scores `model` on `pairs`, `chunk` of them at a time.
@@ -47,18 +48,23 @@ pub fn validate<C: Trained>(
     workers: &Workers,
 ) -> Result<Validation, ValidateError> {
     let chunks: Vec<&[Pair]> = pairs.chunks(chunk.max(1)).collect();
-    let run = |i: usize| Some(config.found(model, to_shard(chunks[i], 0.5, device)?));
+    let run = |i: usize| {
+        let (pairs, batch) = to_batch(chunks[i], 0.5, device).ok_or(ValidateError::Failed)?;
+        let Found { poses, notes } = config.found(model, batch)?;
+        let poses = poses.iter().map(|(rotation, translation)| pairs.poses(rotation, translation));
+        Ok::<_, ValidateError>((poses.collect::<Result<Vec<_>, _>>()?, notes))
+    };
     let results = workers.map(chunks.len(), run).ok_or(ValidateError::Failed)?;
 
     let mut errors: Vec<Vec<PairError>> = vec![Vec::new(); C::ROWS.len()];
     let mut notes = BTreeMap::new();
     for (chunk, result) in chunks.iter().zip(results) {
-        let found = result.ok_or(ValidateError::Failed)??;
-        for (errors, poses) in errors.iter_mut().zip(found.poses) {
+        let (poses, found_notes) = result?;
+        for (errors, poses) in errors.iter_mut().zip(poses) {
             let truths = chunk.iter().map(|pair| &pair.target_from_source);
             errors.extend(poses.iter().zip(truths).map(|(p, truth)| PairError::new(p.as_ref(), truth)));
         }
-        for (name, value) in found.notes {
+        for (name, value) in found_notes {
             *notes.entry(name).or_insert(0.0) += value * chunk.len() as f64 / pairs.len() as f64;
         }
     }

@@ -20,14 +20,16 @@ use burn::optim::GradientsParams;
 use burn::tensor::{DType, Device, Tensor};
 use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_model::weights::parameters;
-use srrf_model::{MatchingConfig, Srrf, correspondence_loss, init, registration_loss, skeleton_loss};
-use srrf_train::config::{Reduce, SemTraining, TrainConfig};
+use srrf_model::{
+    MatchingConfig, Srrf, TrainingBatch, correspondence_loss, init, registration_loss, skeleton_loss,
+};
 use srrf_train::data::TrainingPairs;
-use srrf_train::network::{Shard, Trained};
+use srrf_train::nets::srrf::{Layout, SemTraining, SrrfParts};
 use srrf_train::optimizer::optimizer;
-use srrf_train::rows::{RowGradients, Updater};
-use srrf_train::srrf::Layout;
-use srrf_train::step::{Prepared, StepContext, Workers, gradient, prepare, to_shard};
+use srrf_train::rows::Updater;
+use srrf_train::step::{Prepared, StepContext, gradient, prepare, to_batch};
+use srrf_train::workers::Workers;
+use srrf_train::{TrainConfig, Trained};
 
 /// How far apart two devices may be.
 struct Tolerances {
@@ -120,8 +122,9 @@ fn values<const D: usize>(tensor: &Tensor<D>) -> Vec<f64> {
 fn pass(device: &Device, dtype: DType) -> (Numbers, Numbers) {
     let config = config();
     let pairs = pairs(&config).shard(0, PAIRS).unwrap();
-    let Shard { batch, rotation, translation, .. } = to_shard(&pairs, PHASE, device).unwrap();
-    let (source, target) = (batch.source.cast(dtype), batch.target.cast(dtype));
+    let (_, batch) = to_batch(&pairs, PHASE, device).unwrap();
+    let TrainingBatch { source, target, rotation, translation, .. } = batch;
+    let (source, target) = (source.cast(dtype), target.cast(dtype));
     let (rotation, translation) = (rotation.cast(dtype), translation.cast(dtype));
     let model = network(&config, device).map(&mut Cast(dtype)).train();
     let output = model.forward(&config.network.integration, source.clone(), target.clone(), PHASE).unwrap();
@@ -155,17 +158,18 @@ fn pass(device: &Device, dtype: DType) -> (Numbers, Numbers) {
 
 /// The loss of each of five training steps, and what every parameter moved. The shards of a batch go to the devices
 /// in turn.
-fn train(devices: &[Device], reduce: Reduce) -> (Vec<f64>, Vec<f64>) {
-    let config = TrainConfig { reduce, ..config() };
+fn train(devices: &[Device]) -> (Vec<f64>, Vec<f64>) {
+    let config = config();
     let (pairs, workers) = (pairs(&config), Workers::new(2).unwrap());
-    let stage = config.stages.iter().find(|stage| stage.registration).unwrap();
-    let context = StepContext { config: &config, stage, pairs: &pairs, devices, ahead: None };
+    let stage = config.stages.iter().find(|stage| stage.trains.registration).unwrap();
+    let context =
+        StepContext { config: &config, stage, pairs: &pairs, devices, prefetch: None, stopped: &|| false };
     let mut model = network(&config, &devices[0]).valid();
     let mut updater = Updater::new(optimizer(&config.optimizer), &model);
     let start = flat(&model);
     let mut losses = Vec::new();
     for step in 0..STEPS {
-        let outcome = gradient(&context, &model, step, &workers).unwrap();
+        let outcome = gradient(&context, &model, step, &workers).unwrap().unwrap();
         losses.push(outcome.losses["total"]);
         let rate = context.stage.learning_rate;
         model = updater.step(rate, model, outcome.gradients);
@@ -233,9 +237,9 @@ fn agrees(name: &str, device: &Device, dtype: DType) -> Vec<Measured> {
 }
 
 /// Five training steps on devices against flex.
-fn trains(name: &str, devices: &[Device], reduce: Reduce) -> Vec<Measured> {
-    let (wanted, wanted_moved) = train(&[Device::flex()], Reduce::Ordered);
-    let (found, moved) = train(devices, reduce);
+fn trains(name: &str, devices: &[Device]) -> Vec<Measured> {
+    let (wanted, wanted_moved) = train(&[Device::flex()]);
+    let (found, moved) = train(devices);
     let losses = largest(&found.iter().zip(&wanted).map(|(a, b)| (a - b) / b).collect::<Vec<_>>());
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let difference: Vec<f64> = moved.iter().zip(&wanted_moved).map(|(a, b)| a - b).collect();
@@ -247,22 +251,6 @@ fn trains(name: &str, devices: &[Device], reduce: Reduce) -> Vec<Measured> {
     ]
 }
 
-/// Five training steps with Burn's own all-reduce: over both of two devices of CUDA, or over one where there is no
-/// second.
-#[allow(dead_code, reason = "the default build has flex alone")]
-fn collective(name: &str, device: &Device) -> Vec<Measured> {
-    if name != "cuda" {
-        return Vec::new();
-    }
-    let devices: Vec<Device> =
-        [Some(device.clone()), srrf_model::device("cuda:1").ok()].into_iter().flatten().collect();
-    if let Err(why) = RowGradients::can_all_reduce(name, &devices) {
-        eprintln!("skipped: collective on {} devices: {why}", devices.len());
-        return Vec::new();
-    }
-    trains(&format!("{name} x {}, collective", devices.len()), &devices, Reduce::Collective)
-}
-
 /// The whole suite on a device of this program, if this machine can run it.
 #[allow(dead_code, reason = "the default build has flex alone")]
 fn suite(name: &str) {
@@ -270,10 +258,9 @@ fn suite(name: &str) {
     match srrf_model::device(name) {
         Ok(device) => {
             let mut measured = agrees(name, &device, DType::F32);
-            measured.extend(trains(name, std::slice::from_ref(&device), Reduce::Ordered));
-            measured.extend(collective(name, &device));
+            measured.extend(trains(name, std::slice::from_ref(&device)));
             let by_turns = [device, Device::flex()];
-            measured.extend(trains(&format!("{name} and flex by turns"), &by_turns, Reduce::Ordered));
+            measured.extend(trains(&format!("{name} and flex by turns"), &by_turns));
             hold(&measured);
         }
         Err(e) if required => panic!("{e}"),
@@ -288,37 +275,32 @@ fn flex_with_burns_own_operations_in_f64_agrees() {
 
 #[test]
 fn five_steps_teach_something() {
-    let (losses, moved) = train(&[Device::flex()], Reduce::Ordered);
+    let (losses, moved) = train(&[Device::flex()]);
     assert!(losses.len() == STEPS && largest(&moved) > 1e-3, "{losses:?}");
 }
 
 #[test]
 fn shards_on_two_devices_give_the_steps_of_one() {
     // A copy of the network for each, of the same kind here: the same bytes.
-    let two = train(&[Device::flex(), Device::flex()], Reduce::Ordered);
-    assert_eq!(two, train(&[Device::flex()], Reduce::Ordered));
-}
-
-#[test]
-fn burns_own_layer_is_for_cuda_and_says_so() {
-    let why = RowGradients::can_all_reduce("flex", &[Device::flex()]).unwrap_err();
-    assert!(why.contains("cuda only") && why.contains("`flex`"), "{why}");
+    let two = train(&[Device::flex(), Device::flex()]);
+    assert_eq!(two, train(&[Device::flex()]));
 }
 
 #[test]
 fn what_is_done_ahead_of_a_step_changes_nothing() {
     let mut config = config();
     for stage in &mut config.stages {
-        (stage.sem, stage.registration) = (SemTraining::Frozen, true);
+        stage.trains = SrrfParts { sem: SemTraining::Frozen, registration: true };
     }
     let (pairs, device) = (pairs(&config), Device::flex());
     let (stage, model) = (&config.stages[0], network(&config, &device).valid());
     let gradients = |ahead: bool| {
         let prepared = prepare(&config, stage, &pairs, 1, &device).unwrap();
-        let Prepared { shard, layout } =
-            if ahead { prepared.ahead(&config, &model).unwrap() } else { prepared };
+        let Prepared { batch, layout } =
+            if ahead { prepared.prefetched(&config, &model).unwrap() } else { prepared };
         assert_eq!(matches!(layout, Layout::Registration(_)), ahead);
-        let (all, losses) = config.network.gradient(&config.losses, stage, &model, shard, layout).unwrap();
+        let (all, losses) =
+            config.network.gradient(&config.losses, &stage.trains, &model, batch, layout).unwrap();
         let mut gradients = Gradients { all, path: Vec::new(), found: Numbers::new() };
         model.visit(&mut gradients);
         (gradients.found, losses)
@@ -326,6 +308,27 @@ fn what_is_done_ahead_of_a_step_changes_nothing() {
     let (found, losses) = gradients(true);
     assert!(found.len() > 50 && losses.len() > 5, "something to compare");
     assert_eq!((found, losses), gradients(false));
+}
+
+#[test]
+fn a_step_is_left_out_where_the_run_is_to_stop() {
+    let config = config();
+    let (pairs, workers, devices) = (pairs(&config), Workers::new(1).unwrap(), [Device::flex()]);
+    let asked = std::sync::atomic::AtomicUsize::new(0);
+    // The first shard goes through; the second, and with it the step, does not.
+    let stopped = || asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) > 0;
+    let stage = &config.stages[2];
+    let context = StepContext {
+        config: &config,
+        stage,
+        pairs: &pairs,
+        devices: &devices,
+        prefetch: None,
+        stopped: &stopped,
+    };
+    let model = network(&config, &devices[0]).valid();
+    assert!(gradient(&context, &model, 0, &workers).unwrap().is_none());
+    assert_eq!(asked.into_inner(), 2);
 }
 
 #[cfg(feature = "ndarray")]

@@ -13,9 +13,9 @@ use srrf_cloud::{KnnIndex, Register, Rigid, SoftMatch};
 use srrf_corrupt::{CorruptionKind, Pair, Severity};
 use srrf_eval::{PairError, Scores};
 use srrf_model::{SrrfRegister, device, embedded, keep_freed_memory, network_frame};
-use srrf_train::config::TrainConfig;
+use srrf_train::TrainConfig;
 use srrf_train::data::{TrainingPairs, training_shapes};
-use srrf_train::step::Workers;
+use srrf_train::workers::Workers;
 
 /// Scores rules to choose between the branches on validation pairs.
 #[derive(Parser)]
@@ -140,7 +140,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut judged: Vec<Judged> = Vec::new();
     for &seed in &arguments.seeds {
         config.seed = seed;
-        let pairs = TrainingPairs::new(&config, training_shapes(&config, arguments.data.as_deref())?)?;
+        let pairs = TrainingPairs::new(&config, training_shapes(&config, arguments.data.as_deref(), None)?)?;
         for &severity in &arguments.severities {
             let held_out = pairs.validation(Severity::try_from(severity)?)?;
             let answers =

@@ -18,9 +18,9 @@ use srrf_model::{
     BranchKind, InferenceConfig, InlierTest, IntegrationConfig, Matches, SrrfConfig, SrrfRegister, device,
     embedded, keep_freed_memory,
 };
-use srrf_train::config::TrainConfig;
+use srrf_train::TrainConfig;
 use srrf_train::data::{TrainingPairs, training_shapes};
-use srrf_train::step::Workers;
+use srrf_train::workers::Workers;
 
 /// Scores the ways to use trained weights on validation pairs.
 #[derive(Parser)]
@@ -226,7 +226,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     keep_freed_memory();
     let arguments = Arguments::parse();
     let config = <TrainConfig>::read(&arguments.config)?;
-    let pairs = TrainingPairs::new(&config, training_shapes(&config, arguments.data.as_deref())?)?;
+    let pairs = TrainingPairs::new(&config, training_shapes(&config, arguments.data.as_deref(), None)?)?;
     let mut held_out: Vec<Pair> = Vec::new();
     for &severity in &arguments.severities {
         held_out.extend(pairs.validation(Severity::try_from(severity)?)?);

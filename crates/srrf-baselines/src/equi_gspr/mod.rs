@@ -26,9 +26,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
 use srrf_model::ops::{even_tokens, rows, to_host};
-use srrf_model::{CopyError, NetworkConfig, WrongSize, transform, weighted_procrustes};
+use srrf_model::{CopyError, NetworkConfig, WrongSize, transform, weighted_procrustes, TrainingBatch};
 
-use crate::learned::{LearnedConfig, Lesson, Pose};
+use crate::learned::{LearnedConfig, Pose};
 use crate::se3::constant;
 use graph::GraphLayer;
 pub use matches::PutativeMatches;
@@ -213,10 +213,10 @@ impl LearnedConfig for EquiGsprConfig {
         &self,
         losses: &EquiGsprLosses,
         network: &EquiGspr,
-        lesson: &Lesson,
+        batch: &TrainingBatch,
     ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError> {
-        let scored = self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase)?;
-        let truth = (lesson.rotation.clone(), lesson.translation.clone());
+        let scored = self.forward(network, batch.source.clone(), batch.target.clone(), batch.phase)?;
+        let truth = (batch.rotation.clone(), batch.translation.clone());
         let labels = labels(&scored, truth.clone(), self.match_radius)?;
         let found = Self::fit(&scored)?;
         let chord = (found.rotation - truth.0).square().sum_dim(2).sum_dim(1) / 2.0;

@@ -17,10 +17,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
 use srrf_model::ops::even_tokens;
-use srrf_model::{CopyError, NetworkConfig, WrongSize, transform};
+use srrf_model::{CopyError, NetworkConfig, WrongSize, transform, TrainingBatch};
 
 use crate::dgcnn::max_over;
-use crate::learned::{LearnedConfig, Lesson, Pose};
+use crate::learned::{LearnedConfig, Pose};
 use crate::se3::{exp, identity, parts};
 
 /// How the derivative of the target's feature by its pose is found.
@@ -164,19 +164,19 @@ impl LearnedConfig for PointNetLkConfig {
         &self,
         losses: &PointNetLkLosses,
         network: &PointNetLk,
-        lesson: &Lesson,
+        batch: &TrainingBatch,
     ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError> {
-        let (source, target) = (lesson.source.clone(), lesson.target.clone());
-        let (motion, residual) = self.align(network, source, target, self.iterations, lesson.phase)?;
+        let (source, target) = (batch.source.clone(), batch.target.clone());
+        let (motion, residual) = self.align(network, source, target, self.iterations, batch.phase)?;
         let (rotation, translation) = parts(motion);
         // G G_gt^-1 = [R R_gt^T, t - R R_gt^T t_gt]; the last row of the difference is 0.
-        let turned = rotation.matmul(lesson.rotation.clone().transpose());
-        let [batch, _, _] = turned.dims();
-        let moved = turned.clone().matmul(lesson.translation.clone().unsqueeze_dim::<3>(2));
+        let turned = rotation.matmul(batch.rotation.clone().transpose());
+        let [pairs, _, _] = turned.dims();
+        let moved = turned.clone().matmul(batch.translation.clone().unsqueeze_dim::<3>(2));
         let shift = translation - moved.squeeze_dim::<2>(2);
-        let difference = (turned.clone() - identity(batch, 3, &turned)).square().sum() + shift.square().sum();
-        let residual = residual.square().sum() / batch as f64;
-        let pose = difference / (16 * batch) as f64;
+        let difference = (turned.clone() - identity(pairs, 3, &turned)).square().sum() + shift.square().sum();
+        let residual = residual.square().sum() / pairs as f64;
+        let pose = difference / (16 * pairs) as f64;
         Ok(vec![("residual", residual, losses.residual), ("pose", pose, losses.pose)])
     }
 

@@ -16,10 +16,10 @@ use burn::tensor::{Device, Tensor};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::ops::even_tokens;
-use srrf_model::{CopyError, NetworkConfig, WrongSize, sinkhorn, transform, weighted_procrustes};
+use srrf_model::{CopyError, NetworkConfig, WrongSize, sinkhorn, transform, weighted_procrustes, TrainingBatch};
 
 use crate::dgcnn::{Dgcnn, halves};
-use crate::learned::{LearnedConfig, Lesson, Pose};
+use crate::learned::{LearnedConfig, Pose};
 use crate::se3::compose;
 use layer::GraphLayer;
 
@@ -173,10 +173,10 @@ impl LearnedConfig for RgmConfig {
         &self,
         losses: &RgmLosses,
         network: &Rgm,
-        lesson: &Lesson,
+        batch: &TrainingBatch,
     ) -> Result<Vec<(&'static str, Tensor<1>, f64)>, CopyError> {
-        let found = self.forward(network, lesson.source.clone(), lesson.target.clone(), lesson.phase)?;
-        let posed = transform(found.source_points, lesson.rotation.clone(), lesson.translation.clone());
+        let found = self.forward(network, batch.source.clone(), batch.target.clone(), batch.phase)?;
+        let posed = transform(found.source_points, batch.rotation.clone(), batch.translation.clone());
         let truth = truth::assignment(&posed, &found.target_points, self.match_radius)?;
         let [batch, n, _] = truth.dims();
         let s = found.assignment.clamp(1e-6, 1.0 - 1e-6);

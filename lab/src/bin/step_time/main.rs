@@ -19,11 +19,14 @@ use clap::{Parser, ValueEnum};
 use serde_json::{Map, Value, json};
 use srrf_corrupt::Pair;
 use srrf_model::{PairBatch, Srrf, init, keep_freed_memory};
-use srrf_train::config::{StageConfig, TrainConfig};
+use srrf_train::TrainConfig;
 use srrf_train::data::TrainingPairs;
+use srrf_train::nets::srrf::SrrfParts;
 use srrf_train::optimizer::optimizer;
 use srrf_train::rows::Updater;
-use srrf_train::step::{StepContext, Workers, gradient};
+use srrf_train::stage::StageConfig;
+use srrf_train::step::{StepContext, gradient};
+use srrf_train::workers::Workers;
 
 use crate::clock::{median, memory_mib, summary, timed};
 use crate::clouds::Stored;
@@ -113,21 +116,26 @@ impl Bench {
     }
 
     /// The first stage that trains the registration branches, or the last that trains SEM alone.
-    fn stage(&self, registration: bool) -> Result<&StageConfig, Failure> {
-        let stages = || self.config.stages.iter().filter(|stage| stage.registration == registration);
+    fn stage(&self, registration: bool) -> Result<&StageConfig<SrrfParts>, Failure> {
+        let stages = || self.config.stages.iter().filter(|stage| stage.trains.registration == registration);
         let stage = if registration { stages().next() } else { stages().next_back() };
         stage.ok_or_else(|| "the configuration has no such stage".into())
     }
 
     /// Whole training steps, as `srrf-train` makes them.
-    fn steps(&self, stage: &StageConfig, arguments: &Arguments) -> Result<Map<String, Value>, Failure> {
+    fn steps(
+        &self,
+        stage: &StageConfig<SrrfParts>,
+        arguments: &Arguments,
+    ) -> Result<Map<String, Value>, Failure> {
         let optimizer_config = &self.config.optimizer;
         let context = StepContext {
             config: &self.config,
             stage,
             pairs: &self.pairs,
             devices: std::slice::from_ref(&self.device),
-            ahead: None,
+            prefetch: None,
+            stopped: &|| false,
         };
         let workers = Workers::new(arguments.threads)?;
         let mut model = self.model.clone();
@@ -135,7 +143,7 @@ impl Bench {
         let mut loss = 0.0;
         let mut step = 0;
         let times = timed(arguments, || {
-            let mut outcome = gradient(&context, &model, step, &workers)?;
+            let mut outcome = gradient(&context, &model, step, &workers)?.ok_or("a step was left out")?;
             let clip = optimizer_config.clip_norm;
             if clip > 0.0 && outcome.norm > clip {
                 outcome.gradients.scale(clip / outcome.norm);

@@ -1,4 +1,4 @@
-//! Work done ahead: threads make items by number, a few more than are asked for, so that a device that
+//! Prefetching: threads make items by number, a few more than are asked for, so that a device that
 //! computes elsewhere never waits for the pairs of its next step.
 
 use std::collections::BTreeMap;
@@ -6,12 +6,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Items made ahead, by number.
-pub struct Ahead<T> {
-    shelf: Mutex<Shelf<T>>,
+pub struct Prefetch<T> {
+    state: Mutex<State<T>>,
     changed: Condvar,
 }
 
-struct Shelf<T> {
+struct State<T> {
     /// The number that the next free thread makes.
     next: usize,
     /// Items may be made up to here.
@@ -21,26 +21,26 @@ struct Shelf<T> {
     closed: bool,
 }
 
-impl<T: Send> Ahead<T> {
+impl<T: Send> Prefetch<T> {
     /// Items from number `first` on, at most `depth` more than were taken.
     pub fn new(first: usize, depth: usize) -> Self {
-        let shelf = Shelf { next: first, end: first + depth, ready: BTreeMap::new(), closed: false };
-        Self { shelf: Mutex::new(shelf), changed: Condvar::new() }
+        let state = State { next: first, end: first + depth, ready: BTreeMap::new(), closed: false };
+        Self { state: Mutex::new(state), changed: Condvar::new() }
     }
 
-    /// Makes items until [`Ahead::close`]: what each of the threads does.
+    /// Makes items until [`Prefetch::close`]: what each of the threads does.
     pub fn work(&self, make: impl Fn(usize) -> T) {
         loop {
-            let mut shelf = self.lock();
-            while !shelf.closed && shelf.next >= shelf.end {
-                shelf = self.changed.wait(shelf).unwrap_or_else(PoisonError::into_inner);
+            let mut state = self.lock();
+            while !state.closed && state.next >= state.end {
+                state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
             }
-            if shelf.closed {
+            if state.closed {
                 return;
             }
-            let number = shelf.next;
-            shelf.next += 1;
-            drop(shelf);
+            let number = state.next;
+            state.next += 1;
+            drop(state);
             let made = catch_unwind(AssertUnwindSafe(|| make(number))).ok();
             self.lock().ready.insert(number, made);
             self.changed.notify_all();
@@ -48,19 +48,19 @@ impl<T: Send> Ahead<T> {
     }
 
     /// Item `number`, once it is made; each can be taken once. None where making it panicked, or after
-    /// [`Ahead::close`].
+    /// [`Prefetch::close`].
     pub fn take(&self, number: usize) -> Option<T> {
-        let mut shelf = self.lock();
+        let mut state = self.lock();
         loop {
-            if let Some(made) = shelf.ready.remove(&number) {
-                shelf.end += 1;
+            if let Some(made) = state.ready.remove(&number) {
+                state.end += 1;
                 self.changed.notify_all();
                 return made;
             }
-            if shelf.closed {
+            if state.closed {
                 return None;
             }
-            shelf = self.changed.wait(shelf).unwrap_or_else(PoisonError::into_inner);
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
@@ -70,13 +70,13 @@ impl<T: Send> Ahead<T> {
         self.changed.notify_all();
     }
 
-    fn lock(&self) -> MutexGuard<'_, Shelf<T>> {
-        self.shelf.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, State<T>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// Closes when it goes out of scope, also on the way of an error.
-pub struct Closing<'a, T: Send>(pub &'a Ahead<T>);
+pub struct Closing<'a, T: Send>(pub &'a Prefetch<T>);
 
 impl<T: Send> Drop for Closing<'_, T> {
     fn drop(&mut self) {
@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn items_come_by_number_and_not_too_early() {
         const DEPTH: usize = 3;
-        let (ahead, most) = (Ahead::new(5, DEPTH), AtomicUsize::new(0));
+        let (ahead, most) = (Prefetch::new(5, DEPTH), AtomicUsize::new(0));
         std::thread::scope(|scope| {
             let _closing = Closing(&ahead);
             for _ in 0..4 {
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn a_panic_is_an_empty_item() {
-        let ahead = Ahead::new(0, 2);
+        let ahead = Prefetch::new(0, 2);
         std::thread::scope(|scope| {
             let _closing = Closing(&ahead);
             scope.spawn(|| ahead.work(|i| if i == 1 { std::panic::resume_unwind(Box::new(())) } else { i }));

@@ -3,20 +3,78 @@
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};
-use srrf_cloud::Rigid;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use srrf_model::ops::{CopyError, HostClouds};
 use srrf_model::weights::WeightsError;
 use srrf_model::{
-    BranchLayout, BranchOutput, SemLayout, Skeleton, Srrf, SrrfConfig, SrrfLayout, chamfer,
-    correspondence_loss, embedded, matching_loss, registration_loss, skeleton_loss, spread, transform,
+    BranchLayout, BranchOutput, SemLayout, Skeleton, SkeletonLossConfig, Srrf, SrrfConfig, SrrfLayout,
+    TrainingBatch, chamfer, correspondence_loss, defaults, embedded, matching_loss, registration_loss,
+    skeleton_loss, spread, transform,
 };
 
-use crate::config::{LossConfig, SemTraining, StageConfig};
-use crate::network::{Found, Shard, Terms, Trained};
-use crate::step::Losses;
+use crate::seam::{Found, LossTerms, Losses, StageOf, Trained};
+
+/// Weights of the losses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SrrfLossConfig {
+    /// The skeleton losses.
+    pub skeleton: SkeletonLossConfig,
+    /// Weight of `L_reg` of each branch; 1 is the paper. The other losses of a trained network are ten to a hundred
+    /// times as large.
+    #[serde(default = "defaults::one", skip_serializing_if = "defaults::is_one")]
+    #[schemars(range(min = 0.0, max = 1e6), extend("default" = 1.0))]
+    pub registration: f64,
+    /// Weight of the correspondence loss of each branch; 0 is the paper.
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub correspondence: f64,
+    /// Weight of the matching loss of each branch ([`srrf_model::matching_loss`]); 0 is the paper.
+    #[serde(default, skip_serializing_if = "defaults::is_zero")]
+    #[schemars(range(min = 0.0, max = 1e6), extend("default" = 0.0))]
+    pub matching: f64,
+    /// Weight of `L_reg` of the fused pose, beside `registration` for that of each branch. At 0 the integration is left
+    /// out of the training step, which saves its inlier test; the branches learn from their own poses.
+    #[serde(default = "defaults::one")]
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub fused: f64,
+}
+
+/// What of the network a stage trains.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct SrrfParts {
+    /// What happens to the skeleton module.
+    #[serde(default = "frozen")]
+    pub sem: SemTraining,
+    /// Whether the two branches are trained.
+    #[serde(default = "yes")]
+    pub registration: bool,
+}
+
+fn frozen() -> SemTraining {
+    SemTraining::Frozen
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// What a stage does to the skeleton module.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SemTraining {
+    /// It is used as it is.
+    Frozen,
+    /// Chamfer pre-training.
+    Chamfer,
+    /// The skeleton losses.
+    Skeleton,
+}
 
 impl Trained for SrrfConfig {
-    type LossConfig = LossConfig;
+    type LossConfig = SrrfLossConfig;
+    type Parts = SrrfParts;
+    type Layout = Layout;
     const METHOD: &'static str = "srrf";
     const ROWS: &'static [&'static str] = &["dense", "skeleton", "fused"];
     const CURVES: &'static [&'static str] =
@@ -26,34 +84,36 @@ impl Trained for SrrfConfig {
         Ok(embedded::open(start, device)?.model)
     }
 
-    fn wrong_stage(stage: &StageConfig) -> Option<(&'static str, &'static str)> {
-        (stage.sem == SemTraining::Frozen && !stage.registration)
+    fn wrong_parts(parts: &SrrfParts) -> Option<(&'static str, &'static str)> {
+        (parts.sem == SemTraining::Frozen && !parts.registration)
             .then_some(("registration", "must be true where sem is frozen, or the stage trains nothing"))
     }
 
-    type Layout = Layout;
+    fn trains_poses(parts: &SrrfParts) -> bool {
+        parts.registration
+    }
 
-    fn layout(&self, stage: &StageConfig, clouds: &HostClouds, phase: f32) -> Layout {
-        match stage.registration {
+    fn layout(&self, parts: &SrrfParts, clouds: &HostClouds, phase: f32) -> Layout {
+        match parts.registration {
             true => Layout::Whole(Box::new(SrrfConfig::layout(self, clouds, phase))),
             false => Layout::Skeletons(self.sem.layout(clouds)),
         }
     }
 
-    fn ahead(
+    fn prefetched(
         &self,
-        stages: &[StageConfig],
+        stages: &[StageOf<Self>],
         network: &Srrf,
-        shard: &Shard,
+        batch: &TrainingBatch,
         layout: Layout,
     ) -> Result<Layout, CopyError> {
         let Layout::Whole(mut layout) = layout else { return Ok(layout) };
-        let device = shard.batch.source.device();
+        let device = batch.source.device();
         layout.dense.send(&device);
-        if stages.iter().any(|stage| stage.sem != SemTraining::Frozen) {
+        if stages.iter().any(|stage| stage.trains.sem != SemTraining::Frozen) {
             return Ok(Layout::Whole(layout));
         }
-        let skeletons = network.sem.forward_with(shard.clouds(), &layout.sem)?.detached_points();
+        let skeletons = network.sem.forward_with(batch.clouds(), &layout.sem)?.detached_points();
         let mut on_skeletons = network.skeleton.layout(&HostClouds::read(&skeletons)?, layout.phase);
         on_skeletons.send(&device);
         Ok(Layout::Registration(Box::new(FrozenSkeletons { layout, skeletons, on_skeletons })))
@@ -61,36 +121,35 @@ impl Trained for SrrfConfig {
 
     fn gradient(
         &self,
-        losses: &LossConfig,
-        stage: &StageConfig,
+        losses: &SrrfLossConfig,
+        parts: &SrrfParts,
         network: &Srrf,
-        shard: Shard,
+        batch: TrainingBatch,
         layout: Layout,
     ) -> Result<(GradientsParams, Losses), CopyError> {
         // Only what the stage trains is on the graph.
-        let trains_sem = stage.sem != SemTraining::Frozen;
+        let trains_sem = parts.sem != SemTraining::Frozen;
         let mut fork = network.clone();
         fork.sem = if trains_sem { fork.sem.train() } else { fork.sem.valid() };
-        fork.dense = if stage.registration { fork.dense.train() } else { fork.dense.valid() };
-        fork.skeleton = if stage.registration { fork.skeleton.train() } else { fork.skeleton.valid() };
+        fork.dense = if parts.registration { fork.dense.train() } else { fork.dense.valid() };
+        fork.skeleton = if parts.registration { fork.skeleton.train() } else { fork.skeleton.valid() };
 
         let (skeletons, branches) = match layout {
             Layout::Whole(layout) => {
-                let (source, target) = (shard.batch.source.clone(), shard.batch.target.clone());
+                let (source, target) = (batch.source.clone(), batch.target.clone());
                 let (skeletons, skeleton, dense) = fork.branches(source, target, &layout)?;
                 (Some(skeletons), Some((skeleton, dense)))
             }
             Layout::Registration(known) => {
                 let FrozenSkeletons { layout, skeletons, on_skeletons } = *known;
-                (None, Some(fork.poses(skeletons, &on_skeletons, shard.clouds(), &layout)?))
+                (None, Some(fork.poses(skeletons, &on_skeletons, batch.clouds(), &layout)?))
             }
             Layout::Skeletons(layout) => {
-                (Some(fork.sem.forward_with(shard.clouds(), &layout)?.halves()), None)
+                (Some(fork.sem.forward_with(batch.clouds(), &layout)?.halves()), None)
             }
         };
-        let Shard { batch, rotation, translation, .. } = shard;
-        let (source, target) = (batch.source, batch.target);
-        let mut terms = Terms::default();
+        let TrainingBatch { source, target, rotation, translation, .. } = batch;
+        let mut terms = LossTerms::default();
         if let Some((skeleton, dense)) = branches {
             for (names, branch) in [(DENSE, &dense), (SKELETON, &skeleton)] {
                 branch_terms(&mut terms, names, branch, losses, &rotation, &translation);
@@ -103,18 +162,18 @@ impl Trained for SrrfConfig {
         }
         if let Some((source_skeleton, target_skeleton)) = skeletons.filter(|_| trains_sem) {
             let (x, y) = ((source, &source_skeleton), (target, &target_skeleton));
-            skeleton_terms(&mut terms, stage.sem, losses, x, y, rotation, translation)?;
+            skeleton_terms(&mut terms, parts.sem, losses, x, y, rotation, translation)?;
         }
         terms.finish(&fork)
     }
 
-    fn found(&self, network: &Srrf, shard: Shard) -> Result<Found, CopyError> {
-        let Shard { batch, rotation, translation, phase } = shard;
-        let output = network.forward(&self.integration, batch.source.clone(), batch.target.clone(), phase)?;
-        let poses: Vec<Vec<Option<Rigid>>> = vec![
-            batch.poses(&output.dense.rotation, &output.dense.translation)?,
-            batch.poses(&output.skeleton.rotation, &output.skeleton.translation)?,
-            batch.poses(&output.fused.rotation, &output.fused.translation)?,
+    fn found(&self, network: &Srrf, batch: TrainingBatch) -> Result<Found, CopyError> {
+        let TrainingBatch { source, target, rotation, translation, phase } = batch;
+        let output = network.forward(&self.integration, source, target, phase)?;
+        let poses = vec![
+            (output.dense.rotation, output.dense.translation),
+            (output.skeleton.rotation, output.skeleton.translation),
+            (output.fused.rotation, output.fused.translation),
         ];
         let posed = transform(output.source_skeleton.points, rotation, translation);
         let target = output.target_skeleton.points;
@@ -155,10 +214,10 @@ const SKELETON: [&str; 3] = ["skeleton", "skeleton_correspondence", "skeleton_ma
 
 /// `L_reg` of a branch, its correspondence loss and its matching loss.
 fn branch_terms(
-    terms: &mut Terms,
+    terms: &mut LossTerms,
     [name, correspondence, matching]: [&'static str; 3],
     branch: &BranchOutput,
-    losses: &LossConfig,
+    losses: &SrrfLossConfig,
     rotation: &Tensor<3>,
     translation: &Tensor<2>,
 ) {
@@ -179,9 +238,9 @@ fn branch_terms(
 
 /// The losses of the skeleton module.
 fn skeleton_terms(
-    terms: &mut Terms,
+    terms: &mut LossTerms,
     training: SemTraining,
-    losses: &LossConfig,
+    losses: &SrrfLossConfig,
     (source, source_skeleton): (Tensor<3>, &Skeleton),
     (target, target_skeleton): (Tensor<3>, &Skeleton),
     rotation: Tensor<3>,

@@ -1,50 +1,44 @@
 //! The seam between the loop and what it trains: a new network is one implementation of [`Trained`].
 
+use std::collections::BTreeMap;
+use std::fmt::Debug;
+
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use srrf_cloud::Rigid;
 use srrf_cloud::profile::stage;
 use srrf_model::ops::{CopyError, HostClouds, to_host};
 use srrf_model::weights::WeightsError;
-use srrf_model::{NetworkConfig, PairBatch};
+use srrf_model::{NetworkConfig, TrainingBatch};
 
-use crate::config::StageConfig;
-use crate::step::Losses;
+use crate::stage::StageConfig;
 
-/// Pairs that go through the network together, with their true poses in network units.
-pub struct Shard {
-    /// The clouds.
-    pub batch: PairBatch,
-    /// `[batch, 3, 3]`.
-    pub rotation: Tensor<3>,
-    /// `[batch, 3]`.
-    pub translation: Tensor<2>,
-    /// In [0, 1), from the number of the pair: which points carry tokens. 0.5 in validation.
-    pub phase: f32,
-}
+/// Named means over the pairs of a batch.
+pub type Losses = BTreeMap<&'static str, f64>;
 
-impl Shard {
-    /// Sources and then targets, `[2 batch, points, 3]`.
-    pub fn clouds(&self) -> Tensor<3> {
-        Tensor::cat(vec![self.batch.source.clone(), self.batch.target.clone()], 0)
-    }
-}
+/// A stage of the training of `C`.
+pub type StageOf<C> = StageConfig<<C as Trained>::Parts>;
 
-/// What a network found on the pairs of a shard, for validation.
+/// What a network found on the pairs of a batch, for validation.
 pub struct Found {
-    /// A list of poses for each of [`Trained::ROWS`].
-    pub poses: Vec<Vec<Option<Rigid>>>,
+    /// Rotations `[batch, 3, 3]` and translations `[batch, 3]` in network units, for each of [`Trained::ROWS`].
+    pub poses: Vec<(Tensor<3>, Tensor<2>)>,
     /// Means over the pairs of other quantities, by name.
     pub notes: Vec<(&'static str, f64)>,
 }
 
 /// A network that the loop trains: its sizes, its losses, its poses.
-pub trait Trained: NetworkConfig {
+pub trait Trained: NetworkConfig + JsonSchema {
     /// Weights of the losses, the `[losses]` of a configuration.
-    type LossConfig: Clone + std::fmt::Debug + PartialEq + Serialize + DeserializeOwned + Sync;
+    type LossConfig: Clone + Debug + PartialEq + Serialize + DeserializeOwned + JsonSchema + Send + Sync;
+    /// What of the network a stage trains: keys of each `[[stages]]`.
+    type Parts: Clone + Debug + PartialEq + Serialize + DeserializeOwned + JsonSchema + Send + Sync;
+    /// What the network has to know of a batch's clouds before it computes, found ahead of the step by
+    /// other threads.
+    type Layout: Send;
     /// Name in a configuration, as `method`.
     const METHOD: &'static str;
     /// Poses that validation scores. RMSE(R) of the last one decides which weights are best.
@@ -58,59 +52,58 @@ pub trait Trained: NetworkConfig {
     /// [`WeightsError`] where there are none of this kind.
     fn start(start: &str, device: &Device) -> Result<Self::Network, WeightsError>;
 
-    /// What is wrong with a stage for this network, as key and reason.
-    fn wrong_stage(stage: &StageConfig) -> Option<(&'static str, &'static str)>;
+    /// What is wrong with what a stage trains, as key and reason.
+    fn wrong_parts(parts: &Self::Parts) -> Option<(&'static str, &'static str)>;
 
-    /// What the network has to know of a shard's clouds before it computes, found ahead of the step by
-    /// other threads.
-    type Layout: Send;
+    /// Whether a stage changes the poses, so that validation in it says something.
+    fn trains_poses(parts: &Self::Parts) -> bool;
 
-    /// The layout of a shard: its clouds, sources and then targets.
-    fn layout(&self, stage: &StageConfig, clouds: &HostClouds, phase: f32) -> Self::Layout;
+    /// The layout of a batch: its clouds, sources and then targets.
+    fn layout(&self, parts: &Self::Parts, clouds: &HostClouds, phase: f32) -> Self::Layout;
 
-    /// What the device can do of a shard ahead of its step, on other threads: what depends on those parts of
+    /// What the device can do of a batch ahead of its step, on other threads: what depends on those parts of
     /// `network` alone that none of the `stages` of the run trains. Only called where a device computes beside the host.
     ///
     /// # Errors
     /// [`CopyError`] where the device does not give its numbers.
-    fn ahead(
+    fn prefetched(
         &self,
-        _stages: &[StageConfig],
+        _stages: &[StageOf<Self>],
         _network: &Self::Network,
-        _shard: &Shard,
+        _batch: &TrainingBatch,
         layout: Self::Layout,
     ) -> Result<Self::Layout, CopyError> {
         Ok(layout)
     }
 
-    /// Gradients and losses of one shard, on a graph of its own.
+    /// Gradients and losses of one batch, on a graph of its own.
     ///
     /// # Errors
     /// [`CopyError`] where the device does not give its numbers.
     fn gradient(
         &self,
         losses: &Self::LossConfig,
-        stage: &StageConfig,
+        parts: &Self::Parts,
         network: &Self::Network,
-        shard: Shard,
+        batch: TrainingBatch,
         layout: Self::Layout,
     ) -> Result<(GradientsParams, Losses), CopyError>;
 
-    /// The poses of a shard, as at inference.
+    /// The poses of a batch, as at inference.
     ///
     /// # Errors
     /// [`CopyError`] where the device does not give its numbers.
-    fn found(&self, network: &Self::Network, shard: Shard) -> Result<Found, CopyError>;
+    fn found(&self, network: &Self::Network, batch: TrainingBatch) -> Result<Found, CopyError>;
 }
 
 /// The weighted sum of the loss terms, and their values.
 #[derive(Default)]
-pub struct Terms {
+pub struct LossTerms {
     total: Option<Tensor<1>>,
     values: Vec<(&'static str, Tensor<1>)>,
 }
 
-impl Terms {
+impl LossTerms {
     /// Adds a term; one of weight 0 is only written down.
     pub fn add(&mut self, name: &'static str, value: Tensor<1>, weight: f64) {
         self.values.push((name, value.clone().detach()));

@@ -1,0 +1,120 @@
+//! A training from its configuration file: what a program calls.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use srrf_baselines::{BASELINES, BaselineVisitor, LearnedConfig, visit};
+use srrf_model::SrrfConfig;
+
+use crate::config::{ConfigError, Layers, TrainConfig};
+use crate::data::training_shapes;
+use crate::error::TrainError;
+use crate::nets::baseline::Baseline;
+use crate::options::{Ended, Existing, RunOptions};
+use crate::run::run;
+use crate::seam::Trained;
+
+/// What a caller says beside the configuration.
+pub struct Overrides {
+    /// Where the shapes are; before `data.path` of the configuration.
+    pub data: Option<PathBuf>,
+    /// Where the shapes are by the environment; before `data.path` of the configuration too, and of no concern to one that
+    /// trains on built-in shapes.
+    pub environment_data: Option<PathBuf>,
+    /// Folder of the run; `runs/NAME` if not given.
+    pub folder: Option<PathBuf>,
+    /// Device; before `device` of the configuration, and `flex` if neither is given.
+    pub device: Option<String>,
+    /// Worker threads.
+    pub threads: usize,
+    /// What to do with a checkpoint that is there.
+    pub existing: Existing,
+    /// Stop after this many steps, counted from the start of the run.
+    pub until_step: Option<usize>,
+    /// Stop after this time.
+    pub time_limit: Option<Duration>,
+    /// Where lines about the run go.
+    pub say: fn(&str),
+}
+
+/// Trains what the configuration at `path` names, until done, out of time, or told to `stop`.
+///
+/// # Errors
+/// [`TrainError`]; the last checkpoint stays usable.
+pub fn train(path: &Path, overrides: &Overrides, stop: &AtomicBool) -> Result<Ended, TrainError> {
+    train_layers(&Layers::read(path)?, overrides, stop)
+}
+
+/// Trains what configuration files say together; see [`train`].
+///
+/// # Errors
+/// [`TrainError`]; the last checkpoint stays usable.
+pub fn train_layers(layers: &Layers, overrides: &Overrides, stop: &AtomicBool) -> Result<Ended, TrainError> {
+    let method = layers.method()?;
+    let session = Session { layers, overrides, stop };
+    if method == SrrfConfig::METHOD {
+        return session.train::<SrrfConfig>();
+    }
+    visit(&method, session).unwrap_or_else(|| {
+        let baselines = BASELINES.iter().map(|entry| entry.name);
+        let known: Vec<&str> = [SrrfConfig::METHOD].into_iter().chain(baselines).collect();
+        Err(TrainError::Method { path: layers.path().into(), method, known: known.join(", ") })
+    })
+}
+
+struct Session<'a> {
+    layers: &'a Layers,
+    overrides: &'a Overrides,
+    stop: &'a AtomicBool,
+}
+
+impl BaselineVisitor for Session<'_> {
+    type Output = Result<Ended, TrainError>;
+
+    fn visit<C: LearnedConfig + 'static>(self) -> Self::Output {
+        self.train::<Baseline<C>>()
+    }
+}
+
+impl Session<'_> {
+    fn train<C: Trained>(self) -> Result<Ended, TrainError> {
+        let Self { layers, overrides, stop } = self;
+        let mut config = TrainConfig::<C>::resolve(layers)?;
+        let device = overrides.device.clone().or(config.device.take()).unwrap_or_else(|| "flex".into());
+        let devices = srrf_model::devices(&device)?;
+        config.device = Some(device.clone());
+        let shapes =
+            training_shapes(&config, overrides.data.as_deref(), overrides.environment_data.as_deref())?;
+        let options = RunOptions {
+            folder: overrides.folder.clone().unwrap_or_else(|| Path::new("runs").join(&config.name)),
+            threads: overrides.threads,
+            existing: overrides.existing,
+            until_step: overrides.until_step,
+            time_limit: overrides.time_limit,
+            say: overrides.say,
+        };
+        (options.say)(&format!("config {}, data {}", layers.path().display(), shapes.description()));
+        let folder = options.folder.display();
+        (options.say)(&format!("run {folder}, device {device}, {} threads", options.threads));
+        run(&config, &options, shapes, devices, stop)
+    }
+}
+
+impl Layers {
+    /// The `method` of a configuration, `srrf` if it names none.
+    ///
+    /// # Errors
+    /// [`ConfigError`] where it is no text.
+    pub fn method(&self) -> Result<String, ConfigError> {
+        match self.merged().get("method") {
+            None => Ok(SrrfConfig::METHOD.to_string()),
+            Some(toml::Value::String(method)) => Ok(method.clone()),
+            Some(_) => Err(ConfigError::Value {
+                path: self.path().into(),
+                key: "method".into(),
+                why: "must be text".into(),
+            }),
+        }
+    }
+}
