@@ -21,7 +21,7 @@ TABLE = re.compile(r"(<!-- t:readme -->\n)(.*?)(<!-- / -->)", re.S)
 ROWS = [  # of README's table: key and words
     ("objects", "objects, clean"),
     ("corrupted", "objects, 12 corruptions"),
-    ("partial", "objects with holes"),
+    ("partial", "objects, 70 % of each kept"),
     ("scans", "real scans"),
     ("meshes", "other meshes"),
 ]
@@ -97,12 +97,20 @@ def numbers():
     return found, problems
 
 
+def cell(value, column):
+    """Shares as whole numbers, seconds with one decimal."""
+    try:
+        return f"{float(value):.{1 if column.endswith('seconds') else 0}f}"
+    except ValueError:
+        return value
+
+
 def readme_table(known):
     head = "| pairs | right, % | of the answered right, % | s a pair | best peer | its right, % | its s |"
     columns = ("right", "right_answered", "seconds", "peer", "peer_right", "peer_seconds")
     lines = [head, "|---|---|---|---|---|---|---|"]
     for row, words in ROWS:
-        lines.append(f"| {words} | " + " | ".join(known.get(f"readme.{row}.{c}", "·") for c in columns) + " |")
+        lines.append(f"| {words} | " + " | ".join(cell(known.get(f"readme.{row}.{c}", "·"), c) for c in columns) + " |")
     return "\n".join(lines) + "\n"
 
 

@@ -196,9 +196,10 @@ def main():
         others = right[~abstain].mean() if (~abstain).any() else np.nan
         cells = {"right": right.mean(), "median": np.median(degrees), "abstained": abstain.mean(), "right_answered": others,
                  "p": p.mean(), "peer_right": peer_right.mean(), "peer_median": np.median(peer_degrees)}
-        page.add(f"| {name} | " + " | ".join(f"{value:.2f}" for value in cells.values()) + " |")
+        cells = {cell: "-" if np.isnan(value) else f"{value:.2f}" for cell, value in cells.items()}
+        page.add(f"| {name} | " + " | ".join(cells.values()) + " |")
         key = name.replace(" %", "").replace(" ", "-")
-        page.numbers |= {f"meshes.{key}.{cell}": f"{value:.2f}" for cell, value in cells.items()}
+        page.numbers |= {f"meshes.{key}.{cell}": value for cell, value in cells.items()}
     seconds, peer_seconds = [sum(ours["seconds"].values()) for ours in by_srrf], [warm for _, warm in by_peer]
     page.add("", f"Seconds a pair, median, without reading files: srrf {np.median(seconds):.2f} on one thread each, "
                  f"Open3D {np.median(peer_seconds):.2f} on all threads.")
