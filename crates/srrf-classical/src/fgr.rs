@@ -86,7 +86,7 @@ impl Register for Fgr {
         let Some(refine) = &config.refine else {
             return Ok(Registration { iterations: config.iterations, ..Registration::from_pose(pose) });
         };
-        let refined = RefineTarget::new(target, refine)?.refine(source, &[("fgr", pose)])?;
+        let refined = RefineTarget::new(target, refine)?.refine(source, &[pose])?;
         Ok(Registration {
             converged: refined.converged,
             iterations: config.iterations + refined.iterations,

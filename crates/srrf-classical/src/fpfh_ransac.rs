@@ -116,8 +116,7 @@ impl Register for FpfhRansac {
         let Some(config) = &self.config.refine else {
             return Ok(Registration { iterations: found.drawn, ..Registration::from_pose(found.poses[0]) });
         };
-        let starts: Vec<(&str, Rigid)> = found.poses.iter().map(|pose| ("hypothesis", *pose)).collect();
-        let refined = RefineTarget::new(target, config)?.refine(source, &starts)?;
+        let refined = RefineTarget::new(target, config)?.refine(source, &found.poses)?;
         Ok(Registration {
             converged: refined.converged,
             iterations: found.drawn + refined.iterations,

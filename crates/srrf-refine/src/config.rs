@@ -50,13 +50,13 @@ pub enum Ranking {
     #[default]
     Points,
     /// Distances along the normals: for many starts from anywhere. On two samplings of one mesh it finds the right one of some
-    /// hundred starts in 2 to 3 of 100 pairs more (`docs/experiments.md`).
+    /// hundred starts in 2 to 3 of 100 pairs more.
     Planes,
 }
 
 /// Settings of the refinement. Lengths are relative to the clouds, so that the defaults serve
 /// objects and streets alike. The defaults were chosen on training shapes of ModelNet40 with the
-/// program `examples/tune.rs`; `docs/experiments.md` has the figures.
+/// program `tune` in `lab`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RefineConfig {
@@ -96,7 +96,7 @@ pub struct RefineConfig {
     /// Whether to look for deformation, which makes exact alignment worthless ([`crate::Verdict::Deformed`]).
     /// Default true; clouds of more than `coarse_points` are exempt. Switch it off for small clouds that are known to
     /// be rigid: of two sparse samplings of one shape it takes 2 in 100 for deformed, of small crops and single views up to one
-    /// in eight (`docs/experiments.md`).
+    /// in eight.
     pub check_deformation: bool,
     /// What to answer then. Default: the first start.
     pub deformed: Deformed,
@@ -146,9 +146,9 @@ pub enum RefineError {
     /// There is no start.
     #[error("no start was given: pass at least one pose, such as the identity")]
     NoStart,
-    /// A start holds NaN or infinity.
-    #[error("start `{0}` has numbers that are not finite")]
-    Start(String),
+    /// A start holds NaN or infinity: its number, from 0.
+    #[error("start number {0} (from 0) has numbers that are not finite")]
+    Start(usize),
 }
 
 impl From<RefineError> for RegisterError {

@@ -17,7 +17,7 @@
 //! let pair = pairs.pair(&shapes, 0, cutout, PoseDraw::Seeded, Stream { seed: 1, item: 0 })?;
 //! let off = Rigid { rotation: EulerXyz::from_deg([3.0, -2.0, 4.0]).to_matrix(), ..Rigid::identity() };
 //! let start = pair.target_from_source.compose(&off);
-//! let found = refine(&pair.source, &pair.target, &[("near", start)], &RefineConfig::default())?;
+//! let found = refine(&pair.source, &pair.target, &[start], &RefineConfig::default())?;
 //! assert!(found.kept && found.target_from_source.angle_to_deg(&pair.target_from_source) < 0.1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -34,12 +34,14 @@ mod robust;
 mod soft;
 mod solve;
 mod target;
+mod verdict;
 
 pub use affine::AffineFit;
 pub use config::{Deformed, Metric, Ranking, RefineConfig, RefineError};
 pub use deformation::ResidualStructure;
 pub use evidence::Evidence;
-pub use refine::{Refinement, StartSupport, Verdict};
+pub use refine::{Refinement, StartSupport};
 pub use register::Refined;
 pub use solve::{Match, NormalEquations};
 pub use target::{RefineSource, RefineTarget, refine};
+pub use verdict::Verdict;

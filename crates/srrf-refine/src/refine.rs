@@ -1,7 +1,5 @@
 //! [`Refinement`]: the best of several starts, refined, with the evidence for it.
 
-use std::fmt;
-
 use rayon::prelude::*;
 use serde::Serialize;
 use srrf_cloud::Rigid;
@@ -11,64 +9,14 @@ use crate::deformation::{ResidualStructure, residual_structure};
 use crate::evidence::{Evidence, evidence};
 use crate::matching::{BothSides, both_sides, plane_support, support};
 use crate::prepared::{Prepared, to_global, to_local};
-use crate::robust::{Schedule, Stage, descend};
+use crate::robust::{Descent, Schedule, descend};
 use crate::soft::soft;
+use crate::verdict::{self, Verdict};
 use crate::{Deformed, Metric, Ranking, RefineConfig, RefineError};
-
-/// Residuals count as deformation when they correlate with those of their neighbours in the same cloud by more than the first
-/// number, and along the normals with those of their neighbours in the other cloud by more than the second. Each test alone takes
-/// partial views for bent ones (`docs/experiments.md`). Where the start is no worse an answer than a halfway pose, the numbers are
-/// lower: strong bends have little structure left within reach of a match.
-const DEFORMED_START: (f64, f64) = (0.13, 0.04);
-const DEFORMED_HALFWAY: (f64, f64) = (0.15, 0.09);
-/// So does an affine map that moves the points by more than this, in point spacings, away from any rigid motion, and has more
-/// support than the pose by more than the second number. Partial views of rigid shapes gain less (`docs/experiments.md`).
-const SHEARED_BEND: f64 = 0.75;
-const SHEARED_GAIN: f64 = 0.03;
-/// Where the refinement turns by more than the first number away from the start of a method that knows shapes, a gain of the second is
-/// enough: a sheared box fits as well in a wrong pose as a noisy one in the right one, but where a turn repairs the start, no affine
-/// map is better.
-const WANDERED_DEG: f64 = 20.0;
-const WANDERED_GAIN: f64 = 0.01;
-/// Not so where half of the matches are closer than this, in point spacings: the clouds then share
-/// points, and what is left over are holes.
-const COINCIDENT: f64 = 0.15;
-/// Nor where the refined pose has so much more support than its cautious variant.
-const CLEARLY_BETTER: f64 = 0.05;
-/// Starts within this angle are guesses of one pose; the first of them, by the caller's order, stands for all.
-const SAME_DEG: f64 = 15.0;
-/// The start is the answer where refinement loses so much support. Soft matches may lose a little, since they
-/// do not seek the nearest neighbours that support counts.
-const LOST: f64 = 0.01;
-
-/// What was decided about the refined pose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// The clouds fit rigidly: the refined pose is the answer.
-    Rigid,
-    /// Neighbouring residuals point the same way, as deformation makes them, or an affine map fits better; the best fit is then
-    /// no better a guess of the motion than a good start: the answer is what [`crate::RefineConfig::deformed`] says.
-    Deformed,
-    /// Refinement lowered the support, so the answer is the start.
-    Unsupported,
-}
-
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Rigid => "the clouds fit rigidly",
-            Self::Deformed => "the residuals look like deformation: no exact fit",
-            Self::Unsupported => "refinement lowered the support of the start",
-        })
-    }
-}
 
 /// A start after its short run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StartSupport {
-    /// Its name.
-    pub name: String,
     /// The pose as it was given.
     pub given: Rigid,
     /// Symmetric robust score after the short run, in [0, 1]: the mean over both clouds of
@@ -92,8 +40,8 @@ impl StartSupport {
 pub struct Refinement {
     /// The answer: `target ~ R source + t`.
     pub target_from_source: Rigid,
-    /// Name of the start that the answer comes from: the best supported one, but where the clouds look deformed.
-    pub start: String,
+    /// Number of the start that the answer comes from: the best supported one, but where the clouds look deformed.
+    pub start: usize,
     /// Whether the answer is a refined pose (`true`) or a start as it was given.
     pub kept: bool,
     /// Why.
@@ -124,8 +72,8 @@ pub(crate) struct Run<'a> {
 
 impl Run<'_> {
     /// Short runs of all starts, or just the support of a single one.
-    pub fn shortlist(&self, starts: &[(&str, Rigid)]) -> Vec<StartSupport> {
-        let run = |(name, given): &(&str, Rigid), short: bool| {
+    pub fn shortlist(&self, starts: &[Rigid]) -> Vec<StartSupport> {
+        let run = |given: &Rigid, short: bool| {
             let local = to_local(given, self.source, self.target);
             let pose = if short { self.short_run(&local) } else { local };
             let target_from_source = if short { to_global(&pose, self.source, self.target) } else { *given };
@@ -135,7 +83,7 @@ impl Run<'_> {
                 Ranking::Points => support,
                 Ranking::Planes => plane_support(&matches, spacing),
             };
-            StartSupport { name: (*name).to_owned(), given: *given, support, rank, target_from_source }
+            StartSupport { given: *given, support, rank, target_from_source }
         };
         match starts {
             [only] => vec![run(only, false)],
@@ -145,69 +93,96 @@ impl Run<'_> {
 
     /// The full run of the best of `starts`, and what to make of it.
     pub fn finish(&self, starts: &[StartSupport]) -> Result<Refinement, RefineError> {
-        let best = &starts[StartSupport::best(starts).ok_or(RefineError::NoStart)?];
+        let best = StartSupport::best(starts).ok_or(RefineError::NoStart)?;
+        let full = self.full_run(&self.local(&starts[best].target_from_source));
+        let looks = self.look(&starts[best], &full.pose);
 
-        let start = to_local(&best.given, self.source, self.target);
-        let mut stage = self.full_run(&to_local(&best.target_from_source, self.source, self.target));
-        let residuals = residual_structure(self.source.coarse(), self.target.coarse(), &stage.pose);
-        let mut verdict = Verdict::Rigid;
-        let mut from = best;
-        let mut support = self.support(&stage.pose);
-        let knows_shapes = self.config.deformed == Deformed::Start;
-        let wandered = knows_shapes
-            && best.given.angle_to_deg(&to_global(&stage.pose, self.source, self.target)) > WANDERED_DEG;
-        // Neighbours in large clouds sample one smooth surface: their residuals always hang together.
-        let small = !self.source.has_coarse() && !self.target.has_coarse();
-        let asked = self.config.check_deformation && small && residuals.median > COINCIDENT;
-        let (near, across) = if knows_shapes { DEFORMED_START } else { DEFORMED_HALFWAY };
-        let bent = residuals.correlation > near && residuals.across_correlation > across;
-        let affine = (asked && knows_shapes && !bent)
-            .then(|| affine_fit(self.source.coarse(), self.target.coarse(), &stage.pose, support));
-        let gain = if wandered { WANDERED_GAIN } else { SHEARED_GAIN };
-        let sheared = affine.is_some_and(|fit| fit.bend > SHEARED_BEND && fit.gain > gain);
-        if asked && (bent || sheared) {
-            let cautious = self.cautious_run(&start);
-            // A pose that brings so much more together is right, whatever the residuals look like.
-            if wandered || sheared || support < self.support(&cautious.pose) + CLEARLY_BETTER {
-                verdict = Verdict::Deformed;
-                let near = |s: &&StartSupport| s.given.angle_to_deg(&best.given) < SAME_DEG;
-                from = match self.config.deformed {
-                    // No support tells the starts apart where the clouds are bent.
-                    Deformed::Start => &starts[0],
-                    Deformed::Halfway => starts.iter().find(near).unwrap_or(best),
-                };
-                let given = to_local(&from.given, self.source, self.target);
-                stage = match self.config.deformed {
-                    Deformed::Start => Stage { pose: given, ..cautious },
-                    Deformed::Halfway => halfway(&given, &cautious),
-                };
-                support = self.support(&stage.pose);
-            }
-        }
-        let unrefined = self.support(&start);
-        if verdict == Verdict::Rigid && support < unrefined - LOST {
-            verdict = Verdict::Unsupported;
-            stage.pose = start;
-            support = unrefined;
-        }
-        let answer = match verdict {
-            Verdict::Unsupported => from.given,
-            Verdict::Deformed if self.config.deformed == Deformed::Start => from.given,
-            _ => to_global(&stage.pose, self.source, self.target),
+        let cautious = looks.deformed().then(|| self.cautious_run(&self.local(&starts[best].given)));
+        let reached = match cautious {
+            Some(cautious) if !self.stands(&looks, &cautious.pose) => self.deformed(starts, best, cautious),
+            _ => self.rigid(&starts[best].given, best, full, looks.support),
         };
         Ok(Refinement {
-            target_from_source: answer,
-            start: from.name.clone(),
-            kept: answer != from.given,
-            verdict,
-            converged: stage.converged,
-            iterations: stage.iterations,
-            support,
-            evidence: evidence(self.source, self.target, &answer),
-            residuals,
-            affine,
+            target_from_source: reached.answer,
+            start: reached.start,
+            kept: reached.answer != starts[reached.start].given,
+            verdict: reached.verdict,
+            converged: reached.descent.converged,
+            iterations: reached.descent.iterations,
+            support: reached.support,
+            evidence: evidence(self.source, self.target, &reached.answer),
+            residuals: looks.residuals,
+            affine: looks.affine,
             starts: starts.to_vec(),
         })
+    }
+
+    /// Looks at the residuals of the pose that the full run of `start` reached, and for an affine map that fits better.
+    fn look(&self, start: &StartSupport, pose: &Rigid) -> Looks {
+        let (config, support) = (self.config, self.support(pose));
+        let residuals = residual_structure(self.source.coarse(), self.target.coarse(), pose);
+        // Neighbours in large clouds sample one smooth surface: their residuals always hang together.
+        let small = !self.source.has_coarse() && !self.target.has_coarse();
+        let asked = config.check_deformation && small && verdict::are_two_samplings(&residuals);
+        let bent = asked && verdict::look_bent(&residuals, config.deformed);
+        let wandered = verdict::wandered(&start.given, &self.global(pose), config.deformed);
+        let affine = (asked && !bent && config.deformed == Deformed::Start)
+            .then(|| affine_fit(self.source.coarse(), self.target.coarse(), pose, support));
+        let sheared = affine.is_some_and(|fit| verdict::look_sheared(&fit, wandered));
+        Looks { support, residuals, affine, bent, sheared, wandered }
+    }
+
+    /// Whether the refined pose stands although the clouds look deformed in it: it brings so much more together than its cautious
+    /// variant. A pose that wandered, or that an affine map betters, does not.
+    fn stands(&self, looks: &Looks, cautious: &Rigid) -> bool {
+        !looks.wandered && !looks.sheared && verdict::clearly_better(looks.support, self.support(cautious))
+    }
+
+    /// The answer where the clouds look deformed: no support tells the starts apart then.
+    fn deformed(&self, starts: &[StartSupport], best: usize, cautious: Descent) -> Reached {
+        let from = match self.config.deformed {
+            Deformed::Start => 0,
+            Deformed::Halfway => {
+                let near = |s: &StartSupport| verdict::same_guess(&s.given, &starts[best].given);
+                starts.iter().position(near).unwrap_or(best)
+            }
+        };
+        let given = self.local(&starts[from].given);
+        let (descent, answer) = match self.config.deformed {
+            Deformed::Start => (Descent { pose: given, ..cautious }, starts[from].given),
+            Deformed::Halfway => {
+                let halfway = halfway(&given, &cautious);
+                (halfway, self.global(&halfway.pose))
+            }
+        };
+        Reached {
+            verdict: Verdict::Deformed,
+            start: from,
+            support: self.support(&descent.pose),
+            answer,
+            descent,
+        }
+    }
+
+    /// The answer where they do not: the refined pose, or the start where that has more support.
+    fn rigid(&self, given: &Rigid, best: usize, full: Descent, support: f64) -> Reached {
+        let of_start = self.support(&self.local(given));
+        let (verdict, support, answer) = if verdict::lost_support(support, of_start) {
+            (Verdict::Unsupported, of_start, *given)
+        } else {
+            (Verdict::Rigid, support, self.global(&full.pose))
+        };
+        Reached { verdict, start: best, support, answer, descent: full }
+    }
+
+    /// A pose between the inputs as one between the centred clouds.
+    fn local(&self, pose: &Rigid) -> Rigid {
+        to_local(pose, self.source, self.target)
+    }
+
+    /// The way back from [`Run::local`].
+    fn global(&self, pose: &Rigid) -> Rigid {
+        to_global(pose, self.source, self.target)
     }
 
     /// A few iterations on the coarse level.
@@ -233,7 +208,7 @@ impl Run<'_> {
     }
 
     /// Coarse, fine, soft.
-    fn full_run(&self, start: &Rigid) -> Stage {
+    fn full_run(&self, start: &Rigid) -> Descent {
         let config = self.config;
         let two_levels = self.source.has_coarse() || self.target.has_coarse();
         let (s, t) = (self.source.coarse(), self.target.coarse());
@@ -252,14 +227,14 @@ impl Run<'_> {
     }
 
     /// Point to point down to three tenths of the spacing: moves little where there is no exact fit.
-    fn cautious_run(&self, start: &Rigid) -> Stage {
+    fn cautious_run(&self, start: &Rigid) -> Descent {
         let (s, t) = (self.source.coarse(), self.target.coarse());
         let schedule = Schedule::new(s, t, start, self.target.radius, self.config);
         let schedule = Schedule { end: 0.6 * schedule.end, ..schedule };
         self.descend_on(false, start, &schedule, Metric::PointToPoint)
     }
 
-    fn descend_on(&self, fine: bool, start: &Rigid, schedule: &Schedule, metric: Metric) -> Stage {
+    fn descend_on(&self, fine: bool, start: &Rigid, schedule: &Schedule, metric: Metric) -> Descent {
         let (s, t) = if fine {
             (self.source.fine(), self.target.fine())
         } else {
@@ -269,19 +244,45 @@ impl Run<'_> {
     }
 }
 
+/// What the refined pose looks like.
+struct Looks {
+    support: f64,
+    residuals: ResidualStructure,
+    affine: Option<AffineFit>,
+    bent: bool,
+    sheared: bool,
+    wandered: bool,
+}
+
+impl Looks {
+    fn deformed(&self) -> bool {
+        self.bent || self.sheared
+    }
+}
+
+/// What was decided.
+struct Reached {
+    verdict: Verdict,
+    /// Number of the start that the answer comes from.
+    start: usize,
+    support: f64,
+    answer: Rigid,
+    descent: Descent,
+}
+
 /// Halfway from `start` to where `stage` ended. Their errors differ, so that the mean has less of either: on sheared
 /// and warped training pairs it is closer to the truth than both.
-fn halfway(start: &Rigid, stage: &Stage) -> Stage {
+fn halfway(start: &Rigid, stage: &Descent) -> Descent {
     let end = &stage.pose;
     match Rigid::nearest_rotation(&(0.5 * (start.rotation + end.rotation))) {
         Some(rotation) => {
             let translation = 0.5 * (start.translation + end.translation);
-            Stage { pose: Rigid { rotation, translation }, ..*stage }
+            Descent { pose: Rigid { rotation, translation }, ..*stage }
         }
         None => *stage,
     }
 }
 
-fn after(first: Stage, then: Stage) -> Stage {
-    Stage { iterations: first.iterations + then.iterations, ..then }
+fn after(first: Descent, then: Descent) -> Descent {
+    Descent { iterations: first.iterations + then.iterations, ..then }
 }

@@ -32,8 +32,8 @@ impl<R: Register> Refined<R> {
         source: Solid<'_>,
         target: Solid<'_>,
     ) -> Result<Registration, RegisterError> {
-        let mut starts: Vec<(&str, Rigid)> = vec![("answer", found.target_from_source)];
-        starts.extend(found.branches.iter().map(|b| (b.name, b.target_from_source)));
+        let branches = found.branches.iter().map(|b| b.target_from_source);
+        let starts: Vec<Rigid> = std::iter::once(found.target_from_source).chain(branches).collect();
         let target = RefineTarget::new(target, &self.config)?;
         let refined = target.refine(source, &starts)?;
         let mut branches = found.branches;

@@ -8,7 +8,7 @@ use crate::{Metric, RefineConfig};
 
 /// Where a stage ended.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Stage {
+pub(crate) struct Descent {
     pub pose: Rigid,
     pub iterations: usize,
     pub converged: bool,
@@ -47,9 +47,9 @@ pub(crate) fn descend(
     metric: Metric,
     schedule: &Schedule,
     tolerance: f64,
-) -> Stage {
+) -> Descent {
     let (a, b) = metric.weights();
-    let mut stage = Stage { pose: *pose, iterations: 0, converged: false };
+    let mut stage = Descent { pose: *pose, iterations: 0, converged: false };
     let mut scale = schedule.start;
     while stage.iterations < schedule.iterations {
         let stride = if scale > schedule.end { schedule.first_stride } else { 1 };

@@ -5,7 +5,7 @@ use srrf_cloud::Rigid;
 
 use crate::matching::motion;
 use crate::prepared::Level;
-use crate::robust::Stage;
+use crate::robust::Descent;
 use crate::solve::{Match, NormalEquations};
 
 /// Candidates of a point. At the end of the robust stage the true match is nearly always among the
@@ -26,11 +26,11 @@ const OUTLIER: f64 = 0.01;
 /// with the weight of an outlier; `s` follows from the matches, starts at 0.7 of the point spacing, and
 /// goes to zero where points coincide. Nearest neighbours, in contrast, always choose the candidate
 /// that agrees with the current pose, and so hardly move it.
-pub(crate) fn soft(source: &Level, target: &Level, pose: &Rigid, radius: f64, tolerance: f64) -> Stage {
+pub(crate) fn soft(source: &Level, target: &Level, pose: &Rigid, radius: f64, tolerance: f64) -> Descent {
     let spacing = source.spacing.max(target.spacing);
     let smallest = 1e-3 * spacing;
     let mut deviation = 0.7 * spacing;
-    let mut stage = Stage { pose: *pose, iterations: 0, converged: false };
+    let mut stage = Descent { pose: *pose, iterations: 0, converged: false };
     for _ in 0..ROUNDS {
         let inverse = stage.pose.inverse();
         let forth = candidates(target, source.points(), &stage.pose);

@@ -50,12 +50,12 @@ impl RefineTarget {
         evidence(&source.prepared, &self.prepared, pose)
     }
 
-    /// Refines the best of `starts`: named poses that map the source near the target.
+    /// Refines the best of `starts`: poses that map the source near the target.
     ///
     /// # Errors
     /// As [`RefineTarget::source`]; [`RefineError::NoStart`] without starts, [`RefineError::Start`] for one that is
     /// not finite.
-    pub fn refine(&self, source: Solid<'_>, starts: &[(&str, Rigid)]) -> Result<Refinement, RefineError> {
+    pub fn refine(&self, source: Solid<'_>, starts: &[Rigid]) -> Result<Refinement, RefineError> {
         let source = self.source(source)?;
         self.finish(&source, &self.shortlist(&source, starts)?)
     }
@@ -68,11 +68,11 @@ impl RefineTarget {
     pub fn shortlist(
         &self,
         source: &RefineSource,
-        starts: &[(&str, Rigid)],
+        starts: &[Rigid],
     ) -> Result<Vec<StartSupport>, RefineError> {
         let finite = |p: &Rigid| p.rotation.iter().chain(p.translation.iter()).all(|v| v.is_finite());
-        match starts.iter().find(|(_, pose)| !finite(pose)) {
-            Some((name, _)) => Err(RefineError::Start((*name).to_owned())),
+        match starts.iter().position(|pose| !finite(pose)) {
+            Some(number) => Err(RefineError::Start(number)),
             None => Ok(self.run(source).shortlist(starts)),
         }
     }
@@ -90,7 +90,7 @@ impl RefineTarget {
     }
 }
 
-/// Refines the best of `starts`: named poses that map `source` near `target`.
+/// Refines the best of `starts`: poses that map `source` near `target`.
 ///
 /// Several starts get a short run each, on few points; the best supported one gets the full run: a
 /// robust stage (nearest neighbours both ways, Geman-McClure, shrinking scale), coarse to fine for
@@ -105,7 +105,7 @@ impl RefineTarget {
 pub fn refine(
     source: &PointCloud,
     target: &PointCloud,
-    starts: &[(&str, Rigid)],
+    starts: &[Rigid],
     config: &RefineConfig,
 ) -> Result<Refinement, RefineError> {
     let target = Solid::new(target).map_err(RefineError::Target)?;

@@ -4,7 +4,7 @@
 use std::error::Error;
 
 use rand::{SeedableRng, rngs::ChaCha8Rng};
-use srrf::{Options, Outcome, Registrar, RotationRange};
+use srrf::{Options, Outcome, Registrar, Request, RotationRange};
 use srrf_cloud::{EulerXyz, PointCloud, Rigid};
 use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
 
@@ -28,7 +28,8 @@ pub type Scan = (PointCloud, Rigid);
 pub fn register_all(map: &PointCloud, scans: &[Scan]) -> Result<Vec<Outcome>, Box<dyn Error>> {
     let registrar = Registrar::new(Options { rotation: RotationRange::Within45, ..Options::default() })?;
     let target = registrar.prepare(map)?;
-    Ok(scans.iter().map(|(scan, _)| registrar.register_to(scan, &target)).collect::<Result<_, _>>()?)
+    let register = |(scan, _): &Scan| registrar.register(&Request::new(scan, &target));
+    Ok(scans.iter().map(register).collect::<Result<_, _>>()?)
 }
 
 /// A shape, and scans of it.

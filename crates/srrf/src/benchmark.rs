@@ -2,8 +2,10 @@
 
 use srrf_cloud::{Certainty, Register, RegisterError, Registration, Solid};
 
+use crate::error::Error;
 use crate::options::RotationRange;
-use crate::registrar::{Error, Registrar};
+use crate::registrar::Registrar;
+use crate::request::Request;
 
 impl Register for Registrar {
     fn name(&self) -> &str {
@@ -15,12 +17,12 @@ impl Register for Registrar {
 
     /// What [`Registrar::register`] answers: its pose, the iterations of the refinement behind it, and how sure it is.
     fn register_solid(&self, source: Solid<'_>, target: Solid<'_>) -> Result<Registration, RegisterError> {
-        let found = Self::register(self, &source, &target)?;
+        let found = Self::register(self, &Request::new(source.cloud(), target.cloud()))?;
         let run = found.refinement.as_ref();
         Ok(Registration {
             converged: run.is_none_or(|r| r.converged),
             iterations: run.map_or(1, |r| r.iterations),
-            certainty: Some(Certainty { probability: found.probability, abstain: found.abstain }),
+            certainty: Some(Certainty { probability: found.probability.get(), abstain: found.abstain }),
             ..Registration::from_pose(found.target_from_source)
         })
     }
@@ -32,9 +34,9 @@ impl From<Error> for RegisterError {
             Error::Source(e) => Self::Source(e),
             Error::Target(e) => Self::Target(e),
             Error::Refine(e) => e.into(),
-            Error::Device(e) => e.into(),
-            Error::NoPose(why) => Self::NoPose(why),
-            other @ Error::Setup(_) => Self::NoPose(other.to_string()),
+            Error::Copy(e) => e.into(),
+            Error::NoPose(why) => Self::NoPose(why.to_string()),
+            other => Self::NoPose(other.to_string()),
         }
     }
 }
@@ -62,11 +64,13 @@ mod tests {
         let registrar = Registrar::new(options).unwrap();
         let row: &dyn Register = &registrar;
         assert_eq!(row.name(), "srrf-register-45");
-        let (scored, found) =
-            (row.register(&source, &target).unwrap(), registrar.register(&source, &target).unwrap());
+        let (scored, found) = (
+            row.register(&source, &target).unwrap(),
+            registrar.register(&Request::new(&source, &target)).unwrap(),
+        );
         assert_eq!(scored.target_from_source, found.target_from_source);
         let certainty = scored.certainty.unwrap();
-        assert_eq!((certainty.probability, certainty.abstain), (found.probability, found.abstain));
+        assert_eq!((certainty.probability, certainty.abstain), (found.probability.get(), found.abstain));
         assert_eq!(scored.iterations, found.refinement.unwrap().iterations);
         assert!(scored.iterations > 1 && certainty.probability > 0.5);
     }

@@ -17,7 +17,7 @@
 //! ```
 //!
 //! [`Registrar`] holds the options and the network, and serves many pairs; [`Registrar::prepare`] makes
-//! a target ready for many sources.
+//! a target ready for many sources. A [`Request`] says what is to be registered, and holds a first guess if there is one.
 //!
 //! Coordinates go in and come out in `f64`, in the unit and the frame of the input. Inside, both clouds
 //! are centred, so that map coordinates keep their last millimetre.
@@ -26,23 +26,44 @@
 extern crate self as srrf;
 
 mod benchmark;
+mod calibration;
 #[doc(hidden)]
 pub mod cli;
-mod frame;
+mod coarse;
+mod error;
+mod features;
+mod judge;
 mod network;
 mod options;
 mod outcome;
 mod probability;
+mod proposals;
 mod registrar;
+mod request;
 mod search;
 mod skeleton;
-mod starts;
+mod stage;
+mod start;
+mod target;
+mod warning;
 
+pub use calibration::{CalibrationError, Logistic};
+pub use coarse::CoarsePose;
+pub use error::{Error, NoPose};
+pub use features::Features;
+pub use network::WeightsId;
 pub use options::{Method, Options, OptionsError, RotationRange};
-pub use outcome::{CoarsePose, Outcome, PointCounts, StageTime};
-pub use probability::{FEATURES, Features, Logistic};
-pub use registrar::{Error, Registrar, Target};
-pub use skeleton::{Skeleton, skeleton};
+pub use outcome::{Outcome, PointCounts, TriedStart};
+pub use probability::Probability;
+pub use registrar::Registrar;
+pub use request::{Request, RequestTarget};
+pub use skeleton::{FoundSkeleton, skeleton};
+pub use stage::{Stage, StageTime};
+pub use start::Start;
+pub use target::Target;
+pub use warning::Warning;
+
+use std::sync::OnceLock;
 
 use srrf_cloud::PointCloud;
 
@@ -54,11 +75,15 @@ use srrf_cloud::PointCloud;
 /// [`Error`] for clouds that determine no rotation (fewer than three points, all on one line), and where
 /// no pose is found.
 pub fn register(source: &PointCloud, target: &PointCloud) -> Result<Outcome, Error> {
-    static DEFAULT: std::sync::OnceLock<Result<Registrar, String>> = std::sync::OnceLock::new();
-    match DEFAULT.get_or_init(|| Registrar::new(Options::default()).map_err(|e| e.to_string())) {
-        Ok(registrar) => registrar.register(source, target),
-        Err(problem) => Err(Error::Setup(problem.clone())),
-    }
+    static DEFAULT: OnceLock<Registrar> = OnceLock::new();
+    let registrar = match DEFAULT.get() {
+        Some(registrar) => registrar,
+        None => {
+            let loaded = Registrar::new(Options::default())?;
+            DEFAULT.get_or_init(|| loaded)
+        }
+    };
+    registrar.register(&Request::new(source, target))
 }
 
 /// The README's example compiles.

@@ -1,36 +1,46 @@
 //! The network as a source of starts.
 
+use serde::Serialize;
 use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid, thin_to};
 use srrf_model::weights::LoadedModel;
 use srrf_model::{SrrfRegister, embedded};
+
+use crate::error::Error;
 
 /// Points of the cloud that the network chooses its 1,024 from: enough to look evenly over a scan.
 const THINNED: usize = 8192;
 /// Tokens of the dense branch where the network only glances at a pair.
 const GLANCE_TOKENS: usize = 128;
 
+/// Which weights a network has.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct WeightsId {
+    /// Their name.
+    pub name: String,
+    /// Their SHA-256, in hexadecimal.
+    pub sha256: String,
+}
+
 /// A loaded network.
 #[derive(Debug)]
 pub struct Network {
     register: SrrfRegister,
     glance: SrrfRegister,
-    /// Name of the weights.
-    pub name: String,
-    /// SHA-256 of the weights.
-    pub sha256: String,
+    /// Which one it is.
+    pub weights: WeightsId,
 }
 
 impl Network {
     /// Loads weights: a file, or the name of a model in the program; the default if `None`.
     ///
     /// # Errors
-    /// In words, with the file and the way out.
-    pub fn load(from: Option<&str>, device: &str) -> Result<Self, String> {
+    /// [`Error::Weights`], [`Error::Device`].
+    pub fn load(from: Option<&str>, device: &str) -> Result<Self, Error> {
         let loaded = open(from, device)?;
-        let device = srrf_model::device(device).map_err(|e| e.to_string())?;
-        let (name, sha256) = (loaded.name.clone(), loaded.sha256.clone());
+        let device = srrf_model::device(device).map_err(Error::Device)?;
+        let weights = WeightsId { name: loaded.name.clone(), sha256: loaded.sha256.clone() };
         let glance = SrrfRegister::glance(loaded.clone(), device.clone(), GLANCE_TOKENS);
-        Ok(Self { register: SrrfRegister::new(loaded, device), glance, name, sha256 })
+        Ok(Self { register: SrrfRegister::new(loaded, device), glance, weights })
     }
 
     /// The network's poses after `start` has moved the source.
@@ -64,11 +74,11 @@ impl Network {
 /// a name.
 ///
 /// # Errors
-/// In words, with the file and the way out.
-pub fn open(from: Option<&str>, device: &str) -> Result<LoadedModel, String> {
-    let device = srrf_model::device(device).map_err(|e| e.to_string())?;
+/// [`Error::Weights`], [`Error::Device`].
+pub fn open(from: Option<&str>, device: &str) -> Result<LoadedModel, Error> {
+    let device = srrf_model::device(device).map_err(Error::Device)?;
     let loaded = from.map_or_else(|| embedded::load_default(&device), |name| embedded::open(name, &device));
-    loaded.map_err(|e| format!("--weights {e}"))
+    loaded.map_err(Error::Weights)
 }
 
 /// An even part of a large cloud: voxel centroids, [`THINNED`] or fewer. A cloud that is small already

@@ -4,8 +4,9 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
-use srrf_cloud::Rigid;
 use srrf_refine::{Deformed, Ranking, RefineConfig};
+
+use crate::probability::Probability;
 
 /// How starts for the refinement are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -27,6 +28,11 @@ pub enum Method {
 impl Method {
     /// All methods, the default first.
     pub const ALL: [Self; 5] = [Self::Auto, Self::Srrf, Self::FpfhRansac, Self::Icp, Self::Given];
+
+    /// Whether it looks for poses by features, without a first guess.
+    pub(crate) fn looks_globally(self) -> bool {
+        matches!(self, Self::Auto | Self::FpfhRansac)
+    }
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -97,8 +103,6 @@ pub struct Options {
     pub method: Method,
     /// How far the clouds may be turned. Default [`RotationRange::Any`].
     pub rotation: RotationRange,
-    /// A first guess, in input coordinates. Default: none, which stands for the identity.
-    pub given: Option<Rigid>,
     /// The refinement; `None` answers with the coarse pose. Default on.
     pub refine: Option<RefineConfig>,
     /// Weights: a file, or the name of a model in the program. Default `srrf`.
@@ -108,7 +112,7 @@ pub struct Options {
     /// Seed of the random samples of FPFH with RANSAC; nothing else draws. Default 0.
     pub seed: u64,
     /// The verdict is to abstain where the probability is below this. Default 0.5.
-    pub abstain_below: f64,
+    pub abstain_below: Probability,
 }
 
 impl Default for Options {
@@ -116,7 +120,6 @@ impl Default for Options {
         Self {
             method: Method::Auto,
             rotation: RotationRange::Any,
-            given: None,
             refine: Some(RefineConfig {
                 ranking: Ranking::Planes,
                 deformed: Deformed::Halfway,
@@ -125,7 +128,7 @@ impl Default for Options {
             weights: None,
             device: "flex".to_owned(),
             seed: 0,
-            abstain_below: 0.5,
+            abstain_below: Probability::HALF,
         }
     }
 }
@@ -148,9 +151,9 @@ mod tests {
         assert_eq!(line, Options::default().to_string());
         let others = [
             Options { rotation: RotationRange::Within45, ..options.clone() },
-            Options { given: Some(Rigid::identity()), ..options.clone() },
+            Options { seed: 1, ..options.clone() },
             Options { refine: None, ..options.clone() },
-            Options { abstain_below: 0.6, ..options.clone() },
+            Options { abstain_below: Probability::ZERO, ..options.clone() },
         ];
         assert!(others.iter().all(|other| other.to_string() != line), "{line}");
         assert!(line.contains("\"rotation\":\"180\"") && line.contains("\"soft_points\":4096"), "{line}");

@@ -1,28 +1,19 @@
 //! [`Outcome`]: everything that a user may ask of a registration.
 
 use nalgebra::{Rotation3, UnitQuaternion};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use serde_json::{Value, json};
-use srrf_cloud::{Branch, EulerXyz, Rigid, Skeletons, SoftMatch};
+use srrf_cloud::{EulerXyz, Rigid};
 use srrf_refine::{Evidence, Refinement};
 
+use crate::coarse::{CoarsePose, matrix};
+use crate::features::Features;
+use crate::network::WeightsId;
 use crate::options::Method;
-use crate::probability::Features;
-
-/// What the network found, before any refinement, in input coordinates.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CoarsePose {
-    /// The fused pose.
-    pub target_from_source: Rigid,
-    /// The poses of the branches (`dense` and `skeleton`), each with its inlier ratio gamma.
-    pub branches: Vec<Branch>,
-    /// Weight of the dense branch in the fusion, `gamma_c / (gamma_c + gamma_s)`.
-    pub lambda: f64,
-    /// Skeletons, in input coordinates.
-    pub skeletons: Option<Skeletons>,
-    /// Soft matches of the dense branch, in input coordinates.
-    pub matches: Vec<SoftMatch>,
-}
+use crate::probability::Probability;
+use crate::stage::StageTime;
+use crate::start::Start;
+use crate::warning::Warning;
 
 /// Numbers of points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -33,29 +24,34 @@ pub struct PointCounts {
     pub target: usize,
 }
 
-/// Time that a stage took.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct StageTime {
-    /// The stage.
-    pub stage: &'static str,
-    /// Its wall time.
-    pub seconds: f64,
+/// A start that was tried.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TriedStart {
+    /// Where it comes from.
+    #[serde(rename = "name")]
+    pub start: Start,
+    /// As [`srrf_refine::StartSupport::support`].
+    pub support: f64,
+    /// As [`srrf_refine::StartSupport::rank`].
+    pub rank: f64,
 }
 
 /// A registration, and what speaks for it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Outcome {
     /// The pose, in input coordinates: `target ~ R source + t`.
     pub target_from_source: Rigid,
     /// Calibrated probability that the pose is within 5 degrees and a tenth of the target's radius
     /// (root mean square) of the true one; see [`crate::Logistic`].
-    pub probability: f64,
+    pub probability: Probability,
     /// Whether the probability is too small to rely on the pose.
     pub abstain: bool,
     /// The method.
     pub method: Method,
-    /// Name of the start that won, such as `network fused` or `fpfh-ransac`.
-    pub start: String,
+    /// The start that won.
+    pub start: Start,
+    /// All starts that were tried, in the order of the rounds; as many as `refinement` holds.
+    pub tried: Vec<TriedStart>,
     /// What the network found from the given pose, where the method uses it.
     pub network: Option<CoarsePose>,
     /// The refinement, unless it was switched off; poses in it are between the centred clouds.
@@ -70,10 +66,10 @@ pub struct Outcome {
     pub times: Vec<StageTime>,
     /// Seed of the random samples.
     pub seed: u64,
-    /// Name of the network's weights, and their SHA-256; `None` where no network was used.
-    pub weights: Option<(String, String)>,
-    /// What a user should know, each a sentence.
-    pub warnings: Vec<String>,
+    /// The network's weights; `None` where no network was used.
+    pub weights: Option<WeightsId>,
+    /// What a user should know.
+    pub warnings: Vec<Warning>,
 }
 
 impl Outcome {
@@ -90,7 +86,7 @@ impl Outcome {
     pub fn to_json(&self) -> Value {
         let evidence = &self.evidence;
         let times: serde_json::Map<String, Value> =
-            self.times.iter().map(|t| (t.stage.to_owned(), json!(t.seconds))).collect();
+            self.times.iter().map(|t| (t.stage.to_string(), json!(t.seconds))).collect();
         json!({
             "target_from_source": matrix(&self.target_from_source),
             "probability": self.probability,
@@ -110,7 +106,7 @@ impl Outcome {
                 "support": r.support,
                 "residual_correlation": r.residuals.correlation,
                 "residual_correlation_across": r.residuals.across_correlation,
-                "starts": r.starts.iter().map(|s| json!({ "name": s.name, "support": s.support, "rank": s.rank })).collect::<Vec<_>>(),
+                "starts": self.tried,
             })),
             "evidence": {
                 "spacing": evidence.spacing,
@@ -127,37 +123,19 @@ impl Outcome {
                 "information_order": "rotation x y z (radians), translation x y z, in the target frame about `information_centre`",
                 "information_centre": evidence.information_centre.as_slice(),
             },
-            "features": self.features.to_json(),
+            "features": self.features,
             "points": self.points,
             "seconds": times,
             "seed": self.seed,
-            "weights": self.weights.as_ref().map(|(name, sha256)| json!({ "name": name, "sha256": sha256 })),
+            "weights": self.weights,
             "warnings": self.warnings,
         })
     }
 }
 
-impl CoarsePose {
-    fn to_json(&self) -> Value {
-        let branches: serde_json::Map<String, Value> = self
-            .branches
-            .iter()
-            .map(|b| {
-                let value =
-                    json!({ "target_from_source": matrix(&b.target_from_source), "inlier_ratio": b.inlier_ratio });
-                (b.name.to_owned(), value)
-            })
-            .collect();
-        json!({
-            "target_from_source": matrix(&self.target_from_source),
-            "branches": branches,
-            "lambda": self.lambda,
-        })
+/// As [`Outcome::to_json`].
+impl Serialize for Outcome {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.to_json().serialize(serializer)
     }
-}
-
-/// A pose as 4 rows of 4.
-fn matrix(pose: &Rigid) -> Value {
-    let m = pose.to_matrix4();
-    json!((0..4).map(|i| m.row(i).iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>())
 }

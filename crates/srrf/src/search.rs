@@ -1,91 +1,173 @@
 //! [`Search`]: starts in rounds, the best of them refined.
 
 use srrf_cloud::Rigid;
-use srrf_refine::{Evidence, RefineError, RefineSource, RefineTarget, Refinement, StartSupport, Verdict};
+use srrf_refine::{Evidence, RefineError, RefineTarget, Refinement, StartSupport, Verdict};
 
-use crate::probability::Features;
-
-/// A named pose between the centred clouds.
-pub type Start = (String, Rigid);
+use crate::coarse::CoarsePose;
+use crate::error::NoPose;
+use crate::features::Features;
+use crate::outcome::TriedStart;
+use crate::proposals::{Proposal, Proposals, Proposed};
+use crate::stage::{Clock, Stage, StageTime};
+use crate::start::Start;
+use crate::target::PreparedPair;
+use crate::warning::Warning;
 
 /// What the starts so far came to.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub(crate) struct Best {
+    /// Between the centred clouds.
     pub pose: Rigid,
-    pub start: String,
+    pub start: Start,
     pub refinement: Option<Refinement>,
     pub evidence: Evidence,
     pub features: Features,
 }
 
+/// What was learned on the way.
+#[derive(Debug)]
+pub(crate) struct Learned {
+    pub tried: Vec<TriedStart>,
+    pub network: Option<CoarsePose>,
+    pub warnings: Vec<Warning>,
+    pub times: Vec<StageTime>,
+}
+
 /// The starts of one pair. Each gets one short run, whichever round it comes in, and the full run is made
 /// anew only where a later round has a better start.
-pub struct Search<'a> {
-    target: &'a RefineTarget,
-    source: RefineSource,
+pub(crate) struct Search<'a> {
+    pair: &'a PreparedPair,
     refine: bool,
-    starts: Vec<StartSupport>,
+    clock: Clock,
+    starts: Vec<Start>,
+    /// One for each of `starts`.
+    supports: Vec<StartSupport>,
+    /// Less likely starts, for the next round.
+    spare: Vec<Proposal>,
     /// Full runs so far, each after the number of its start; that of the first round comes first.
     refined: Vec<(usize, Refinement)>,
+    network: Option<CoarsePose>,
+    warnings: Vec<Warning>,
 }
 
 impl<'a> Search<'a> {
-    /// Without starts. Where `refine` is false they are compared as they are.
-    pub fn new(target: &'a RefineTarget, source: RefineSource, refine: bool) -> Self {
-        Self { target, source, refine, starts: Vec::new(), refined: Vec::new() }
+    /// Without starts. Where `refine` is false they are compared as they are. `clock` goes on with its times.
+    pub fn new(pair: &'a PreparedPair, refine: bool, clock: Clock) -> Self {
+        Self {
+            pair,
+            refine,
+            clock,
+            starts: Vec::new(),
+            supports: Vec::new(),
+            spare: Vec::new(),
+            refined: Vec::new(),
+            network: None,
+            warnings: Vec::new(),
+        }
     }
 
-    /// One more round.
-    pub fn add(&mut self, starts: &[Start]) -> Result<(), RefineError> {
-        let named: Vec<(&str, Rigid)> = starts.iter().map(|(name, pose)| (name.as_str(), *pose)).collect();
-        if self.refine {
-            self.starts.extend(self.target.shortlist(&self.source, &named)?);
-        } else {
-            // A shortlist of one moves nothing.
-            for start in named {
-                self.starts.extend(self.target.shortlist(&self.source, &[start])?);
+    /// One more round: what was spare in the one before, and what these sources find.
+    pub fn propose(&mut self, sources: &[Box<dyn Proposals>]) -> Result<(), RefineError> {
+        let mut proposals = std::mem::take(&mut self.spare);
+        for source in sources {
+            let Proposed { starts, spare, network, warning } = source.propose(self.pair);
+            proposals.extend(starts);
+            self.spare.extend(spare);
+            self.network = network.or(self.network.take());
+            self.warnings.extend(warning);
+            if let Some(stage) = source.stage() {
+                self.clock.lap(stage);
             }
         }
+        self.add(&proposals)
+    }
+
+    /// Ranks more starts.
+    fn add(&mut self, proposals: &[Proposal]) -> Result<(), RefineError> {
+        let (target, source) = (&self.pair.target.0.refine, &self.pair.refine);
+        let poses: Vec<Rigid> = proposals.iter().map(|p| p.pose).collect();
+        // A shortlist of one moves nothing.
+        let together = if self.refine { poses.len().max(1) } else { 1 };
+        for some in poses.chunks(together) {
+            self.supports.extend(target.shortlist(source, some)?);
+        }
+        self.starts.extend(proposals.iter().map(|p| p.start));
+        let found = |method| self.starts.iter().any(|start| start.method() == method);
+        self.warnings.retain(|w| !matches!(w, Warning::NoPose { method, .. } if found(*method)));
         Ok(())
     }
 
-    /// The best start, refined. Where the clouds look deformed in its pose, no support tells a start of a later round from those of the
-    /// first, whose answer then stands: on bent clouds it is within 10 degrees more often (`docs/experiments.md`).
-    pub fn best(&mut self) -> Result<Found, RefineError> {
-        let starts = &self.starts;
-        let best = StartSupport::best(starts).ok_or(RefineError::NoStart)?;
-        let rivals: Vec<(Rigid, f64)> = starts.iter().map(|s| (s.target_from_source, s.rank)).collect();
-        if !self.refine {
-            let (pose, start) = (starts[best].given, starts[best].name.clone());
-            let evidence = self.target.evidence(&self.source, &pose);
-            let features = Features::new(&evidence, None, &pose, starts[best].rank, &rivals);
-            return Ok(Found { pose, start, refinement: None, evidence, features });
-        }
+    /// The best start, refined; none without starts. Where the clouds look deformed in its pose, no support tells a start of a later
+    /// round from those of the first, whose answer then stands: on bent clouds it is within 10 degrees more often. The time counts
+    /// for `stage`, that of the first ranking for [`Stage::Refine`].
+    pub fn best(&mut self, stage: Stage) -> Result<Option<Best>, RefineError> {
+        let Some(best) = StartSupport::best(&self.supports) else { return Ok(None) };
+        let found = if self.refine { self.refined(best)? } else { self.as_given(best) };
+        let first = !self.clock.has(Stage::Refine);
+        self.clock.lap(if first { Stage::Refine } else { stage });
+        Ok(Some(found))
+    }
+
+    fn as_given(&self, best: usize) -> Best {
+        let pose = self.supports[best].given;
+        let evidence = self.target().evidence(&self.pair.refine, &pose);
+        let features = Features::new(&evidence, None, &pose, self.supports[best].rank, &self.rivals());
+        Best { pose, start: self.starts[best], refinement: None, evidence, features }
+    }
+
+    fn refined(&mut self, best: usize) -> Result<Best, RefineError> {
         let run = match self.refined.iter().position(|(start, _)| *start == best) {
             Some(run) => run,
             None => {
-                self.refined.push((best, self.target.finish(&self.source, starts)?));
+                self.refined.push((best, self.target().finish(&self.pair.refine, &self.supports)?));
                 self.refined.len() - 1
             }
         };
         let stands = if self.refined[run].1.verdict == Verdict::Deformed { 0 } else { run };
-        let (from, refined) = self.refined[stands].clone();
-        let refined = Refinement { starts: starts.clone(), ..refined };
+        let (from, refined) = &self.refined[stands];
+        let refined = Refinement { starts: self.supports.clone(), ..refined.clone() };
         let (pose, start, evidence) =
-            (refined.target_from_source, refined.start.clone(), refined.evidence.clone());
-        let features = Features::new(&evidence, Some(&refined), &pose, starts[from].rank, &rivals);
-        Ok(Found { pose, start, refinement: Some(refined), evidence, features })
+            (refined.target_from_source, self.starts[refined.start], refined.evidence.clone());
+        let rank = self.supports[*from].rank;
+        let features = Features::new(&evidence, Some(&refined), &pose, rank, &self.rivals());
+        Ok(Best { pose, start, refinement: Some(refined), evidence, features })
+    }
+
+    fn target(&self) -> &'a RefineTarget {
+        &self.pair.target.0.refine
+    }
+
+    /// The poses of all starts with their ranks.
+    fn rivals(&self) -> Vec<(Rigid, f64)> {
+        self.supports.iter().map(|s| (s.target_from_source, s.rank)).collect()
+    }
+
+    /// Why there is no start.
+    pub fn no_pose(self) -> NoPose {
+        NoPose(self.warnings)
+    }
+
+    /// The end: what was learned on the way.
+    pub fn finish(self) -> Learned {
+        let tried = self.starts.iter().zip(&self.supports);
+        Learned {
+            tried: tried.map(|(&start, s)| TriedStart { start, support: s.support, rank: s.rank }).collect(),
+            network: self.network,
+            warnings: self.warnings,
+            times: self.clock.into_times(),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::{EulerXyz, Solid};
+    use srrf_cloud::EulerXyz;
     use srrf_corrupt::shapes::ProceduralShapes;
     use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Severity, Stream};
 
     use super::*;
     use crate::Options;
+    use crate::target::Target;
 
     /// How far the answers of two rounds are from each other, in degrees: the first has a start that is off, the second the truth.
     fn second_round_turns_by(kind: CorruptionKind) -> f64 {
@@ -94,25 +176,28 @@ mod tests {
         let corruption = Some((kind, Severity::ALL[3]));
         let pair =
             synthesizer.pair(&shapes, 1, corruption, PoseDraw::Seeded, Stream { seed: 5, item: 1 }).unwrap();
-        let truth = pair.target_from_source;
-        let off = |degrees: [f64; 3]| Rigid {
-            rotation: EulerXyz::from_deg(degrees).to_matrix(),
-            ..Rigid::identity()
+        let options = Options::default();
+        let target = Target::new(&pair.target, &options).unwrap();
+        let pair = PreparedPair::new(&pair.source, target, &pair.target_from_source, &options).unwrap();
+        let off = |start, degrees: [f64; 3]| {
+            let by = Rigid { rotation: EulerXyz::from_deg(degrees).to_matrix(), ..Rigid::identity() };
+            Proposal { start, pose: by.compose(&pair.initial) }
         };
-        let start = |name: &str, by: &Rigid| (name.to_owned(), by.compose(&truth));
 
-        let config = Options::default().refine.unwrap();
-        let target = RefineTarget::new(Solid::new(&pair.target).unwrap(), &config).unwrap();
-        let source = target.source(Solid::new(&pair.source).unwrap()).unwrap();
-        let mut search = Search::new(&target, source, true);
-        search
-            .add(&[start("off", &off([90.0, 60.0, 20.0])), start("more", &off([-70.0, 40.0, 110.0]))])
-            .unwrap();
-        let first = search.best().unwrap();
-        search.add(&[start("true", &Rigid::identity()), start("near", &off([1.0, 1.0, 1.0]))]).unwrap();
-        let second = search.best().unwrap();
+        let mut search = Search::new(&pair, true, Clock::after(Vec::new()));
+        assert!(search.best(Stage::Refine).unwrap().is_none());
+        let far = [off(Start::Icp, [90.0, 60.0, 20.0]), off(Start::Given, [-70.0, 40.0, 110.0])];
+        search.add(&far).unwrap();
+        let first = search.best(Stage::Refine).unwrap().unwrap();
+        let near = [off(Start::NetworkFused, [0.0; 3]), off(Start::Orientation(1), [1.0, 1.0, 1.0])];
+        search.add(&near).unwrap();
+        let second = search.best(Stage::RefineAgain).unwrap().unwrap();
         let starts = &second.refinement.as_ref().unwrap().starts;
         assert!(StartSupport::best(starts).unwrap() > 1 && starts.len() == 4, "the later starts are better");
+        let learned = search.finish();
+        let stages: Vec<Stage> = learned.times.iter().map(|t| t.stage).collect();
+        assert_eq!(stages, [Stage::Refine, Stage::RefineAgain]);
+        assert_eq!((learned.tried[3].start, learned.tried[3].rank), (Start::Orientation(1), starts[3].rank));
         first.pose.angle_to_deg(&second.pose)
     }
 

@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
-use srrf::{Features, Logistic, Options, Registrar, RotationRange};
+use srrf::{Features, Logistic, Options, Registrar, Request, RotationRange};
 use srrf_cloud::{PointCloud, Rigid, is_right};
 use srrf_corrupt::crop::{crop, random_direction, visible};
 use srrf_corrupt::datasets::{ShapeSource, Split, held_out, open};
@@ -43,9 +43,9 @@ fn main() {
             let any = i % 2 == 1;
             let pair = pair(i, any, &built_in, modelnet.as_deref());
             let (row, source, target, truth) = pair;
-            let found = registrars[usize::from(any)].register(&source, &target).unwrap();
+            let found = registrars[usize::from(any)].register(&Request::new(&source, &target)).unwrap();
             let right = is_right(&found.target_from_source, &truth, &source, &target);
-            Example { row, features: found.features, probability: found.probability, right }
+            Example { row, features: found.features, probability: found.probability.get(), right }
         })
         .collect();
 
@@ -64,7 +64,7 @@ fn main() {
         },
     );
     let model = Logistic::fit(&pairs_of(fitted), 10.0, what).unwrap();
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("calibration.json");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/srrf/calibration.json");
     std::fs::write(&path, serde_json::to_string_pretty(&model).unwrap() + "\n").unwrap();
 
     println!("the file that was in the program, on all pairs:");
@@ -72,7 +72,7 @@ fn main() {
     println!("the file that was in the program, on the held-out pairs:");
     reliability(held_out.iter().map(|(_, e)| (e.probability, e.right)));
     println!("the new file, on the held-out pairs:");
-    reliability(held_out.iter().map(|(_, e)| (model.probability(&e.features), e.right)));
+    reliability(held_out.iter().map(|(_, e)| (model.probability(&e.features).get(), e.right)));
     println!("the new file, by kind, on all pairs:");
     println!(
         "| pairs | right | mean probability | abstained | right of the others | right of the abstained |"
@@ -85,7 +85,7 @@ fn main() {
         let of: Vec<(f64, bool)> = examples
             .iter()
             .filter(|e| e.row == row)
-            .map(|e| (model.probability(&e.features), e.right))
+            .map(|e| (model.probability(&e.features).get(), e.right))
             .collect();
         let share = |f: &dyn Fn(&(f64, bool)) -> bool, among: &dyn Fn(&(f64, bool)) -> bool| {
             let all: Vec<_> = of.iter().filter(|x| among(x)).collect();

@@ -78,8 +78,8 @@ fn main() {
                 partial(rows[row], &mut pair, stream);
             }
             let found = network.register(&pair.source, &pair.target).unwrap();
-            let mut starts: Vec<(&str, Rigid)> = vec![("answer", found.target_from_source)];
-            starts.extend(found.branches.iter().map(|b| (b.name, b.target_from_source)));
+            let branches = found.branches.iter().map(|b| b.target_from_source);
+            let starts: Vec<Rigid> = std::iter::once(found.target_from_source).chain(branches).collect();
             let rule = RefineConfig::default();
             let full = RefineConfig { check_deformation: false, ..rule };
             let cautious = RefineConfig {
@@ -89,13 +89,13 @@ fn main() {
                 check_deformation: false,
                 ..rule
             };
-            let by = |config: &RefineConfig, starts: &[(&str, Rigid)]| {
+            let by = |config: &RefineConfig, starts: &[Rigid]| {
                 let (source, target) = (Solid::new(&pair.source).unwrap(), Solid::new(&pair.target).unwrap());
                 RefineTarget::new(target, config).unwrap().refine(source, starts).unwrap()
             };
             let (rule, full) = (by(&rule, &starts), by(&full, &starts));
-            let cautious = by(&cautious, &[("start", winner(&full, &starts))]);
-            let start = winner(&full, &starts);
+            let start = starts[full.start];
+            let cautious = by(&cautious, &[start]);
             let halfway = between(&start, &cautious.target_from_source);
             let fused_halfway = between(&found.target_from_source, &cautious.target_from_source);
             let error = |pose: &Rigid| -> f64 {
@@ -164,9 +164,4 @@ fn between(a: &Rigid, b: &Rigid) -> Rigid {
         rotation: Rigid::nearest_rotation(&(0.5 * (a.rotation + b.rotation))).unwrap(),
         translation: 0.5 * (a.translation + b.translation),
     }
-}
-
-/// The start that won, as it was given.
-fn winner(refined: &srrf_refine::Refinement, starts: &[(&str, Rigid)]) -> Rigid {
-    starts.iter().find(|(name, _)| *name == refined.start).map_or(starts[0].1, |(_, pose)| *pose)
 }

@@ -103,7 +103,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             rows[0].add(&start, &pair.target_from_source);
             for (i, (_, config)) in variants.iter().enumerate() {
                 let clock = Instant::now();
-                let found = refine(&pair.source, &pair.target, &[("start", start)], config)?;
+                let found = refine(&pair.source, &pair.target, &[start], config)?;
                 rows[i + 1].seconds += clock.elapsed().as_secs_f64();
                 rows[i + 1].add(&found.target_from_source, &pair.target_from_source);
                 if i == 0 {

@@ -9,12 +9,12 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::ThreadPoolBuilder;
 use serde_json::{Value, json};
-use srrf::Registrar;
+use srrf::{Registrar, Request};
 
 use super::batch_output::Results;
 use super::batch_pairs::{PairRow, Pairs};
+use super::common::{failed, left_out, to_json, unusable};
 use super::method::MethodArgs;
-use super::register::{failed, to_json, warning};
 use super::transform;
 use srrf_args::Failure;
 use srrf_args::Output;
@@ -58,7 +58,7 @@ pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
     files::check_output(&args.output)?;
     let threads = args.common.threads.start()?;
     let pairs = Pairs::read(&args.pairs)?;
-    let registrar = Registrar::new(args.method.options()).map_err(|e| Failure::usage(e.to_string()))?;
+    let registrar = Registrar::new(args.method.options()).map_err(unusable)?;
     let described = args.describe();
     let (results, done) = Results::open(&args.output, &pairs.rows, &described)?;
     let todo: Vec<&PairRow> = pairs.rows.iter().filter(|row| !done.contains_key(&row.number)).collect();
@@ -186,17 +186,12 @@ impl Batch<'_> {
     fn register(&self, row: &PairRow) -> Result<(Value, bool), Failure> {
         let source = files::read_solid(&self.pairs.path(&row.source), None)?;
         let target = files::read_solid(&self.pairs.path(&row.target), None)?;
-        let fail = |e: srrf::Error| failed(&e, &source.name, &target.name);
-        let mut outcome = match &row.initial {
-            None => self.registrar.register(&source.cloud, &target.cloud).map_err(fail)?,
-            Some(initial) => {
-                let given = transform::read(&self.pairs.path(initial))?;
-                let target = self.registrar.prepare(&target.cloud).map_err(fail)?;
-                self.registrar.register_from(&source.cloud, &target, &given).map_err(fail)?
-            }
-        };
+        let initial = row.initial.as_ref().map(|file| transform::read(&self.pairs.path(file))).transpose()?;
+        let request = Request { initial, ..Request::new(&source.cloud, &target.cloud) };
+        let found = self.registrar.register(&request);
+        let mut outcome = found.map_err(|e| failed(e, &source.name, &target.name))?;
         let dropped = [source.dropped, target.dropped];
-        outcome.warnings.extend([&source, &target].into_iter().filter_map(|i| warning(&i.name, i.dropped)));
+        outcome.warnings.extend([&source, &target].into_iter().filter_map(left_out));
         Ok((to_json(&outcome, &row.source, &row.target, dropped), outcome.abstain))
     }
 }

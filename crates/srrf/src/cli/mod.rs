@@ -9,6 +9,7 @@ use srrf_corrupt::cli::{CorruptArgs, corrupt};
 mod batch;
 mod batch_output;
 mod batch_pairs;
+mod common;
 mod inspect;
 mod method;
 mod page;
@@ -21,13 +22,7 @@ mod transform;
 mod view;
 mod weights;
 
-/// The exit codes, for help texts.
-const EXIT_CODES: &str = "Exit codes:
-  0    done; with `register`: a pose was found and is probably right
-  1    failure: no pose was found, or an output could not be written
-  2    bad usage or input
-  3    `register` found a pose and wrote it, but abstains: it may well be wrong
-  130  interrupted; no half-written file remains";
+use common::EXIT_CODES;
 
 /// Registers two point clouds, says whether it worked, and shows it.
 #[derive(Debug, Parser)]

@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use clap::Args;
-use srrf::Outcome;
+use srrf::{Outcome, Warning};
 use srrf_args::flags::Axis;
 use srrf_cloud::{RIGHT_IN_WORDS, Rigid};
 use srrf_view::{Number, Page, Pair, Pose, Up};
 
+use super::common::left_out;
 use srrf_args::files::Input;
 use srrf_args::words::count;
 
@@ -32,8 +33,8 @@ impl PageArgs {
         let mut pair =
             Pair::new(title(source, target), &source.cloud, &target.cloud).unit(&*self.unit).up(up);
         for input in [source, target] {
-            if let Some(warning) = super::register::warning(&input.name, input.dropped) {
-                pair = pair.warning(warning);
+            if let Some(warning) = left_out(input) {
+                pair = pair.warning(warning.to_string());
             }
         }
         pair
@@ -54,7 +55,7 @@ pub fn of_outcome(
     outcome: &Outcome,
     source: &Input,
     target: &Input,
-    given: Option<&Rigid>,
+    initial: Option<&Rigid>,
     args: &PageArgs,
 ) -> String {
     let e = &outcome.evidence;
@@ -65,7 +66,7 @@ pub fn of_outcome(
         .pair(source, target)
         .pose(Pose::new("result", outcome.target_from_source))
         .number(
-            Number::text("Verdict", format!("{verdict} ({})", percent(outcome.probability)))
+            Number::text("Verdict", format!("{verdict} ({})", percent(outcome.probability.get())))
                 .help(format!("probability that the pose is {RIGHT_IN_WORDS} of the true one")),
         )
         .number(Number::new("Rotation", angle).unit("°"))
@@ -80,9 +81,9 @@ pub fn of_outcome(
                 .help(format!("of {} asked", count(e.target_points))),
         )
         .number(Number::new("RMSE of the inliers", e.inlier_rmse))
-        .number(Number::text("Start", &*outcome.start));
-    if let Some(given) = given {
-        pair = pair.before(Pose::new("first guess", *given));
+        .number(Number::text("Start", outcome.start.to_string()));
+    if let Some(initial) = initial {
+        pair = pair.before(Pose::new("first guess", *initial));
     }
     if let Some(r) = &outcome.refinement {
         pair = pair.number(Number::text("Refinement", r.verdict.to_string()));
@@ -103,8 +104,8 @@ pub fn of_outcome(
         pair = pair.matches(network.matches.iter().copied());
     }
     // Those about points left out are there already.
-    for warning in outcome.warnings.iter().filter(|w| !w.ends_with("left out.")) {
-        pair = pair.warning(warning);
+    for warning in outcome.warnings.iter().filter(|w| !matches!(w, Warning::LeftOut { .. })) {
+        pair = pair.warning(warning.to_string());
     }
     Page::new(title(source, target)).pair(pair).to_html()
 }

@@ -5,14 +5,14 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Args;
-use serde_json::{Value, json};
-use srrf::{Outcome, Registrar, StageTime};
+use srrf::{Outcome, Registrar, Request, Stage, StageTime};
 use srrf_cloud::Rigid;
 use srrf_cloud::io::Kept;
 
+use super::common::{EXIT_CODES, failed, left_out, to_json, unusable};
 use super::method::MethodArgs;
 use super::page::{self, PageArgs};
-use super::{EXIT_CODES, rrd, summary, transform};
+use super::{rrd, summary, transform};
 use srrf_args::Failure;
 use srrf_args::Output;
 use srrf_args::files::{self, Input};
@@ -84,24 +84,19 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
     let begun = Instant::now();
     let out = args.check()?;
     args.common.threads.start()?;
-    let mut options = args.method.options();
-    options.given = args.initial.as_deref().map(transform::read).transpose()?;
-    let given = options.given;
+    let initial = args.initial.as_deref().map(transform::read).transpose()?;
     // The network loads while the files are read.
-    let (inputs, registrar) = rayon::join(|| args.read(), || Registrar::new(options));
+    let (inputs, registrar) = rayon::join(|| args.read(), || Registrar::new(args.method.options()));
     let (source, target) = inputs?;
-    let registrar = registrar.map_err(|e| Failure::usage(e.to_string()))?;
+    let registrar = registrar.map_err(unusable)?;
     let opened = begun.elapsed().as_secs_f64();
 
-    let mut outcome = registrar
-        .register(&source.cloud, &target.cloud)
-        .map_err(|e| failed(&e, &source.name, &target.name))?;
-    outcome.times.insert(0, StageTime { stage: "read files, load network", seconds: opened });
-    outcome
-        .warnings
-        .extend([&source, &target].into_iter().filter_map(|input| warning(&input.name, input.dropped)));
+    let request = Request { initial, ..Request::new(&source.cloud, &target.cloud) };
+    let mut outcome = registrar.register(&request).map_err(|e| failed(e, &source.name, &target.name))?;
+    outcome.times.insert(0, StageTime { stage: Stage::Open, seconds: opened });
+    outcome.warnings.extend([&source, &target].into_iter().filter_map(left_out));
 
-    let written = args.write(&outcome, &source, &target, given.as_ref())?;
+    let written = args.write(&outcome, &source, &target, initial.as_ref())?;
     if out != Output::Quiet {
         out.say(&summary::text(&outcome, &source, &target, begun.elapsed().as_secs_f64()));
         written.iter().for_each(|line| out.say(line));
@@ -145,7 +140,7 @@ impl RegisterArgs {
         outcome: &Outcome,
         source: &Input,
         target: &Input,
-        given: Option<&Rigid>,
+        initial: Option<&Rigid>,
     ) -> Result<Vec<String>, Failure> {
         let pose = &outcome.target_from_source;
         let mut lines = Vec::new();
@@ -168,7 +163,7 @@ impl RegisterArgs {
             lines.push(wrote(path, "all figures"));
         }
         if let Some(path) = &self.html {
-            let html = page::of_outcome(outcome, source, target, given, &self.page);
+            let html = page::of_outcome(outcome, source, target, initial, &self.page);
             files::write(path, html.as_bytes())?;
             lines.push(wrote(path, "open it in a browser"));
         }
@@ -178,38 +173,6 @@ impl RegisterArgs {
         }
         Ok(lines)
     }
-}
-
-/// The figures of an answer, and of what it was made from.
-pub fn to_json(outcome: &Outcome, source: &str, target: &str, dropped: [usize; 2]) -> Value {
-    let mut value = outcome.to_json();
-    if let Value::Object(map) = &mut value {
-        map.insert("source".into(), json!(source));
-        map.insert("target".into(), json!(target));
-        map.insert("dropped_points".into(), json!({ "source": dropped[0], "target": dropped[1] }));
-        map.insert("version".into(), json!(env!("CARGO_PKG_VERSION")));
-    }
-    value
-}
-
-/// The failure behind an error of the library, which knows no files.
-pub fn failed(error: &srrf::Error, source: &str, target: &str) -> Failure {
-    match error {
-        srrf::Error::Source(e) => Failure::cloud(source, e),
-        srrf::Error::Target(e) => Failure::cloud(target, e),
-        srrf::Error::Setup(problem) => Failure::usage(problem.clone()),
-        srrf::Error::Device(e) => Failure::failed(e.to_string()),
-        srrf::Error::NoPose(_) | srrf::Error::Refine(_) => Failure::failed(format!(
-            "{source:?} and {target:?}: {error}; look at both with `srrf inspect`, or give a first guess with --initial"
-        )),
-    }
-}
-
-/// The warning about points that were left out.
-pub fn warning(name: &str, dropped: usize) -> Option<String> {
-    let were =
-        if dropped == 1 { "point with NaN or infinity was" } else { "points with NaN or infinity were" };
-    (dropped > 0).then(|| format!("{name}: {dropped} {were} left out."))
 }
 
 fn wrote(path: &Path, what: &str) -> String {

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use srrf::Skeleton;
+use srrf::FoundSkeleton;
 
-use super::register::{failed, warning};
+use super::common::{failed, left_out};
 use srrf_args::Failure;
 use srrf_args::Output;
 use srrf_args::files;
@@ -51,29 +51,29 @@ pub fn run(args: &SkeletonArgs) -> Result<ExitCode, Failure> {
     files::check_output(output)?;
     args.common.threads.start()?;
     let input = files::read_solid(&args.input, None)?;
-    let skeleton = srrf::skeleton(&input.cloud, args.weights.weights.as_deref(), &args.device.device)
-        .map_err(|e| failed(&e, &input.name, &input.name))?;
-    files::write(output, to_ply(&skeleton).as_bytes())?;
+    let found = srrf::skeleton(&input.cloud, args.weights.weights.as_deref(), &args.device.device)
+        .map_err(|e| failed(e, &input.name, &input.name))?;
+    files::write(output, to_ply(&found).as_bytes())?;
     let out = Output::new(args.common.quiet.quiet, files::is_stream(output));
     out.say(&format!(
         "wrote {}: {} spheres of {}, by {}",
         output.display(),
-        count(skeleton.points.len()),
+        count(found.skeleton.points.len()),
         input.name,
-        skeleton.weights
+        found.weights
     ));
-    if let Some(warning) = warning(&input.name, input.dropped) {
+    if let Some(warning) = left_out(&input) {
         out.say(&format!("warning: {warning}"));
     }
     Ok(ExitCode::SUCCESS)
 }
 
 /// PLY, ASCII; numbers read back as the same bits.
-fn to_ply(skeleton: &Skeleton) -> String {
+fn to_ply(FoundSkeleton { skeleton, weights }: &FoundSkeleton) -> String {
     let mut text = format!(
         "ply\nformat ascii 1.0\ncomment skeleton by {}\nelement vertex {}\nproperty double x\nproperty double y\n\
          property double z\nproperty double radius\nend_header\n",
-        skeleton.weights.replace(['\n', '\r'], " "),
+        weights.replace(['\n', '\r'], " "),
         skeleton.points.len()
     );
     for ([x, y, z], radius) in skeleton.points.iter().zip(&skeleton.radii) {

@@ -33,12 +33,12 @@ pub fn text(outcome: &Outcome, source: &Input, target: &Input, seconds: f64) -> 
     let verdict = if outcome.abstain { "abstain: do not rely on it" } else { "probably right" };
     line(
         "verdict",
-        &format!("{verdict}; {:.0} % that it is right ({RIGHT_IN_WORDS})", 100.0 * outcome.probability),
+        &format!("{verdict}; {:.0} % that it is right ({RIGHT_IN_WORDS})", 100.0 * outcome.probability.get()),
     );
     evidence(outcome, &mut line);
     line("time", &times(outcome, seconds));
     for warning in &outcome.warnings {
-        line("warning", warning);
+        line("warning", &warning.to_string());
     }
     out.truncate(out.trim_end().len());
     out

@@ -1,0 +1,55 @@
+//! What several verbs share: exit codes, and what an answer or an error is called in files and messages.
+
+use serde_json::{Value, json};
+use srrf::{Outcome, Warning};
+use srrf_args::Failure;
+use srrf_args::files::Input;
+
+/// The exit codes, for help texts.
+pub const EXIT_CODES: &str = "Exit codes:
+  0    done; with `register`: a pose was found and is probably right
+  1    failure: no pose was found, or an output could not be written
+  2    bad usage or input
+  3    `register` found a pose and wrote it, but abstains: it may well be wrong
+  130  interrupted; no half-written file remains";
+
+/// The figures of an answer, and of what it was made from.
+pub fn to_json(outcome: &Outcome, source: &str, target: &str, dropped: [usize; 2]) -> Value {
+    let mut value = outcome.to_json();
+    if let Value::Object(map) = &mut value {
+        map.insert("source".into(), json!(source));
+        map.insert("target".into(), json!(target));
+        map.insert("dropped_points".into(), json!({ "source": dropped[0], "target": dropped[1] }));
+        map.insert("version".into(), json!(env!("CARGO_PKG_VERSION")));
+    }
+    value
+}
+
+/// The failure behind options that the library cannot use.
+pub fn unusable(error: srrf::Error) -> Failure {
+    let message = match &error {
+        srrf::Error::Weights(e) => format!("--weights {e}"),
+        other => other.to_string(),
+    };
+    Failure::usage(message).because(error)
+}
+
+/// The failure behind an error of the library, which knows no files.
+pub fn failed(error: srrf::Error, source: &str, target: &str) -> Failure {
+    match error {
+        srrf::Error::Source(e) => Failure::cloud(source, &e),
+        srrf::Error::Target(e) => Failure::cloud(target, &e),
+        srrf::Error::Weights(_) | srrf::Error::Device(_) | srrf::Error::Calibration(_) => unusable(error),
+        srrf::Error::Copy(e) => Failure::other(e),
+        srrf::Error::NoPose(_) | srrf::Error::NoSkeleton | srrf::Error::Refine(_) => Failure::failed(format!(
+            "{source:?} and {target:?}: {error}; look at both with `srrf inspect`, or give a first guess with --initial"
+        ))
+        .because(error),
+    }
+}
+
+/// The warning about points of a file that were left out.
+pub fn left_out(input: &Input) -> Option<Warning> {
+    let Input { name, dropped, .. } = input;
+    (*dropped > 0).then(|| Warning::LeftOut { cloud: name.clone(), points: *dropped })
+}

@@ -1,0 +1,70 @@
+//! [`CoarsePose`]: what the network found, before any refinement.
+
+use serde_json::{Value, json};
+use srrf_cloud::{Branch, Registration, Rigid, Skeletons, SoftMatch};
+
+use crate::target::PreparedPair;
+
+/// What the network found, before any refinement, in input coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoarsePose {
+    /// The fused pose.
+    pub target_from_source: Rigid,
+    /// The poses of the branches (`dense` and `skeleton`), each with its inlier ratio gamma.
+    pub branches: Vec<Branch>,
+    /// Weight of the dense branch in the fusion, `gamma_c / (gamma_c + gamma_s)`.
+    pub lambda: f64,
+    /// Skeletons, in input coordinates.
+    pub skeletons: Option<Skeletons>,
+    /// Soft matches of the dense branch, in input coordinates.
+    pub matches: Vec<SoftMatch>,
+}
+
+impl CoarsePose {
+    /// What the network found between the centred clouds of `pair`.
+    pub(crate) fn new(found: &Registration, pair: &PreparedPair) -> Self {
+        let mut branches = found.branches.clone();
+        for branch in &mut branches {
+            branch.target_from_source = pair.frame.undo_pose(&branch.target_from_source);
+        }
+        let gamma = |name: &str| branches.iter().find(|b| b.name == name).map_or(0.0, |b| b.inlier_ratio);
+        let (dense, skeleton) = (gamma("dense"), gamma("skeleton"));
+        let lambda = if dense + skeleton > 0.0 { dense / (dense + skeleton) } else { 0.5 };
+        let frame = &pair.frame;
+        let mut skeletons = found.skeletons.clone();
+        if let Some(Skeletons { source, target }) = &mut skeletons {
+            source.points.iter_mut().for_each(|p| *p = frame.undo_source(p));
+            target.points.iter_mut().for_each(|p| *p = frame.undo_target(p));
+        }
+        let mut matches = found.matches.clone();
+        for m in &mut matches {
+            m.source = frame.undo_source(&m.source);
+            m.target = frame.undo_target(&m.target);
+        }
+        let target_from_source = pair.frame.undo_pose(&found.target_from_source);
+        Self { target_from_source, branches, lambda, skeletons, matches }
+    }
+
+    pub(crate) fn to_json(&self) -> Value {
+        let branches: serde_json::Map<String, Value> = self
+            .branches
+            .iter()
+            .map(|b| {
+                let value =
+                    json!({ "target_from_source": matrix(&b.target_from_source), "inlier_ratio": b.inlier_ratio });
+                (b.name.to_owned(), value)
+            })
+            .collect();
+        json!({
+            "target_from_source": matrix(&self.target_from_source),
+            "branches": branches,
+            "lambda": self.lambda,
+        })
+    }
+}
+
+/// A pose as 4 rows of 4.
+pub(crate) fn matrix(pose: &Rigid) -> Value {
+    let m = pose.to_matrix4();
+    json!((0..4).map(|i| m.row(i).iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>())
+}

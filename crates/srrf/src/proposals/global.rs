@@ -1,0 +1,144 @@
+//! FPFH with RANSAC: at first its likely poses, then the others, and features of wider radii.
+
+use std::sync::Arc;
+
+use srrf_classical::{FpfhRansac, FpfhRansacConfig};
+use srrf_cloud::{RegisterError, Rigid};
+
+use super::{Proposal, Proposals, Proposed, Round};
+use crate::network::Network;
+use crate::options::{Method, Options, RotationRange};
+use crate::stage::Stage;
+use crate::start::Start;
+use crate::target::PreparedPair;
+use crate::warning::Warning;
+
+/// Poses that are starts of the first round.
+const LIKELY: usize = 4;
+/// Poses that each radius of the features gives.
+const POSES: usize = 48;
+/// Radii of the features that are tried where there is doubt, in voxels, beside the default one: on crops and uneven clouds each
+/// finds poses that the others miss.
+const WIDE_RADII: [f64; 2] = [8.0, 12.0];
+/// With [`RotationRange::Within45`], poses that are turned by more than this against the first guess are no starts: 45 degrees
+/// about each of three axes come to 86 at most.
+const WITHIN_DEG: f64 = 90.0;
+
+/// Features of one radius.
+#[derive(Debug, Clone, Copy)]
+struct Global {
+    rotation: RotationRange,
+    seed: u64,
+}
+
+/// Features of the default radius: the likely poses are starts, the others are spare.
+#[derive(Debug)]
+struct Narrow(Global);
+
+/// Features of the radii [`WIDE_RADII`].
+#[derive(Debug)]
+struct Wide(Global);
+
+pub(super) fn narrow(options: &Options, _: Option<&Arc<Network>>) -> Option<Box<dyn Proposals>> {
+    Global::asked(options).map(|global| Box::new(Narrow(global)) as _)
+}
+
+pub(super) fn wide(options: &Options, _: Option<&Arc<Network>>) -> Option<Box<dyn Proposals>> {
+    Global::asked(options).map(|global| Box::new(Wide(global)) as _)
+}
+
+impl Proposals for Narrow {
+    fn round(&self) -> Round {
+        Round::Cheap
+    }
+
+    fn stage(&self) -> Option<Stage> {
+        Some(Stage::FpfhRansac)
+    }
+
+    fn propose(&self, pair: &PreparedPair) -> Proposed {
+        match self.0.search(pair, FpfhRansacConfig::default().feature_voxels) {
+            Ok(mut starts) => {
+                let spare = starts.split_off(LIKELY.min(starts.len()));
+                Proposed { starts, spare, ..Proposed::default() }
+            }
+            Err(why) => Proposed::warning(Warning::no_pose(Method::FpfhRansac, why)),
+        }
+    }
+}
+
+impl Proposals for Wide {
+    fn round(&self) -> Round {
+        Round::Wide
+    }
+
+    fn stage(&self) -> Option<Stage> {
+        Some(Stage::FpfhRansacWider)
+    }
+
+    /// What they do not find, the other starts have to do without.
+    fn propose(&self, pair: &PreparedPair) -> Proposed {
+        let found = WIDE_RADII.into_iter().filter_map(|radius| self.0.search(pair, radius).ok());
+        Proposed::starts(found.flatten().collect())
+    }
+}
+
+impl Global {
+    fn asked(options: &Options) -> Option<Self> {
+        let asked = matches!(options.method, Method::Auto | Method::FpfhRansac);
+        asked.then_some(Self { rotation: options.rotation, seed: options.seed })
+    }
+
+    /// What RANSAC finds with features of this radius (in voxels), best first, as far as the options allow such turns against the
+    /// first guess.
+    fn search(&self, pair: &PreparedPair, feature_voxels: f64) -> Result<Vec<Proposal>, RegisterError> {
+        let config = FpfhRansacConfig {
+            seed: self.seed,
+            feature_voxels,
+            hypotheses: POSES,
+            ..FpfhRansacConfig::default()
+        };
+        let source = pair.source.features().map_err(RegisterError::Source)?;
+        let target = pair.target_side().features().map_err(RegisterError::Target)?;
+        let found = FpfhRansac::new(config).hypotheses(source, target)?;
+        let poses = match self.rotation {
+            RotationRange::Any => found.poses,
+            RotationRange::Within45 => within(found.poses, &pair.initial)?,
+        };
+        let start = Start::FpfhRansac { feature_voxels };
+        Ok(poses.into_iter().map(|pose| Proposal { start, pose }).collect())
+    }
+}
+
+/// The poses that are turned by at most [`WITHIN_DEG`] against the first guess.
+fn within(poses: Vec<Rigid>, given: &Rigid) -> Result<Vec<Rigid>, RegisterError> {
+    let count = poses.len();
+    let kept: Vec<Rigid> = poses.into_iter().filter(|p| p.angle_to_deg(given) <= WITHIN_DEG).collect();
+    if kept.is_empty() {
+        return Err(RegisterError::NoPose(format!(
+            "each of {count} poses is turned by more than {WITHIN_DEG} degrees against the given one; the rotation range \
+             45 excludes them, 180 does not"
+        )));
+    }
+    Ok(kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use srrf_cloud::EulerXyz;
+
+    use super::*;
+
+    #[test]
+    fn poses_beyond_the_range_are_left_out_and_none_left_is_an_error() {
+        let about_z = |degrees| Rigid {
+            rotation: EulerXyz::from_deg([0.0, 0.0, degrees]).to_matrix(),
+            ..Rigid::identity()
+        };
+        let given = about_z(30.0);
+        let poses = vec![about_z(160.0), about_z(119.0), about_z(-59.0), about_z(-61.0)];
+        assert_eq!(within(poses, &given).unwrap(), [about_z(119.0), about_z(-59.0)]);
+        let said = within(vec![about_z(160.0), about_z(-61.0)], &given).unwrap_err().to_string();
+        assert!(said.contains("each of 2 poses") && said.contains("180"), "{said}");
+    }
+}

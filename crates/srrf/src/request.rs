@@ -1,0 +1,49 @@
+//! [`Request`]: what is to be registered.
+
+use srrf_cloud::{PointCloud, Rigid};
+
+use crate::target::Target;
+
+/// What is to be registered: a source, the target that it is laid on, and a first guess if there is one.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    /// The cloud that moves.
+    pub source: &'a PointCloud,
+    /// What it is laid on.
+    pub target: RequestTarget<'a>,
+    /// A first guess of `target_from_source`, in input coordinates; none stands for the identity.
+    pub initial: Option<Rigid>,
+}
+
+/// A target as it is, or one that [`crate::Registrar::prepare`] made ready.
+#[derive(Debug, Clone, Copy)]
+pub enum RequestTarget<'a> {
+    /// A cloud, used once.
+    Cloud(&'a PointCloud),
+    /// One made ready, which serves many sources.
+    Prepared(&'a Target),
+}
+
+impl<'a> Request<'a> {
+    /// Without a first guess. `target` is a cloud or a prepared [`Target`].
+    pub fn new(source: &'a PointCloud, target: impl Into<RequestTarget<'a>>) -> Self {
+        Self { source, target: target.into(), initial: None }
+    }
+
+    /// With a first guess.
+    pub fn with_initial(self, target_from_source: Rigid) -> Self {
+        Self { initial: Some(target_from_source), ..self }
+    }
+}
+
+impl<'a> From<&'a PointCloud> for RequestTarget<'a> {
+    fn from(cloud: &'a PointCloud) -> Self {
+        Self::Cloud(cloud)
+    }
+}
+
+impl<'a> From<&'a Target> for RequestTarget<'a> {
+    fn from(target: &'a Target) -> Self {
+        Self::Prepared(target)
+    }
+}

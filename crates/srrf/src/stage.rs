@@ -1,0 +1,97 @@
+//! [`Stage`]: what a registration spends its time on.
+
+use std::fmt;
+use std::time::Instant;
+
+use serde::{Serialize, Serializer};
+
+/// A stage of a registration. [`fmt::Display`] gives the name in results.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// Reading the files and loading the network; of the program, not of the library.
+    Open,
+    /// Making the target ready: once for many sources.
+    PrepareTarget,
+    /// Making the source ready.
+    PrepareSource,
+    /// The network from the first guess.
+    Network,
+    /// FPFH with RANSAC.
+    FpfhRansac,
+    /// Iterative closest point.
+    Icp,
+    /// Ranking the starts and refining the best.
+    Refine,
+    /// FPFH with RANSAC, wider features.
+    FpfhRansacWider,
+    /// Ranking and refining after those.
+    RefineWider,
+    /// The network from all around.
+    NetworkAllAround,
+    /// Ranking and refining after that.
+    RefineAgain,
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Open => "read files, load network",
+            Self::PrepareTarget => "prepare target",
+            Self::PrepareSource => "prepare source",
+            Self::Network => "network",
+            Self::FpfhRansac => "fpfh-ransac",
+            Self::Icp => "icp",
+            Self::Refine => "refine",
+            Self::FpfhRansacWider => "fpfh-ransac, wider",
+            Self::RefineWider => "refine, wider",
+            Self::NetworkAllAround => "network, 23 orientations",
+            Self::RefineAgain => "refine again",
+        })
+    }
+}
+
+/// By its name.
+impl Serialize for Stage {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// Time that a stage took.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StageTime {
+    /// The stage.
+    pub stage: Stage,
+    /// Its wall time.
+    pub seconds: f64,
+}
+
+/// Measures stages one after the other.
+#[derive(Debug)]
+pub(crate) struct Clock {
+    last: Instant,
+    times: Vec<StageTime>,
+}
+
+impl Clock {
+    /// Starts with stages that were measured before.
+    pub fn after(times: Vec<StageTime>) -> Self {
+        Self { last: Instant::now(), times }
+    }
+
+    /// The time since the last lap was this stage's.
+    pub fn lap(&mut self, stage: Stage) {
+        self.times.push(StageTime { stage, seconds: self.last.elapsed().as_secs_f64() });
+        self.last = Instant::now();
+    }
+
+    /// Whether this stage has had a lap.
+    pub fn has(&self, stage: Stage) -> bool {
+        self.times.iter().any(|time| time.stage == stage)
+    }
+
+    /// The stages so far.
+    pub fn into_times(self) -> Vec<StageTime> {
+        self.times
+    }
+}

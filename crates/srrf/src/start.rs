@@ -1,0 +1,79 @@
+//! [`Start`]: where a pose comes from.
+
+use std::fmt;
+
+use serde::{Serialize, Serializer};
+
+use crate::options::Method;
+
+/// Where a pose that the refinement starts from comes from. [`fmt::Display`] gives the name in results, such as `network fused`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Start {
+    /// The fused pose of the network.
+    NetworkFused,
+    /// The pose of one branch of the network: `dense` or `skeleton`.
+    NetworkBranch(&'static str),
+    /// The network, with the source turned to this orientation of a cube, 1 to 23.
+    Orientation(usize),
+    /// FPFH with RANSAC.
+    FpfhRansac {
+        /// Radius of the features, in voxels.
+        feature_voxels: f64,
+    },
+    /// Iterative closest point from the first guess.
+    Icp,
+    /// The first guess itself.
+    Given,
+}
+
+impl Start {
+    /// The method that finds such starts.
+    pub fn method(self) -> Method {
+        match self {
+            Self::NetworkFused | Self::NetworkBranch(_) | Self::Orientation(_) => Method::Srrf,
+            Self::FpfhRansac { .. } => Method::FpfhRansac,
+            Self::Icp => Method::Icp,
+            Self::Given => Method::Given,
+        }
+    }
+}
+
+impl fmt::Display for Start {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NetworkFused => f.write_str("network fused"),
+            Self::NetworkBranch(name) => write!(f, "network {name}"),
+            Self::Orientation(number) => write!(f, "network, orientation {number}"),
+            Self::FpfhRansac { .. } => f.write_str("fpfh-ransac"),
+            Self::Icp => f.write_str("icp"),
+            Self::Given => f.write_str("given"),
+        }
+    }
+}
+
+/// By its name.
+impl Serialize for Start {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_in_results_stay() {
+        let names = [
+            (Start::NetworkFused, "network fused"),
+            (Start::NetworkBranch("skeleton"), "network skeleton"),
+            (Start::Orientation(7), "network, orientation 7"),
+            (Start::FpfhRansac { feature_voxels: 8.0 }, "fpfh-ransac"),
+            (Start::Icp, "icp"),
+            (Start::Given, "given"),
+        ];
+        for (start, name) in names {
+            assert_eq!((start.to_string(), serde_json::to_value(start).unwrap()), (name.into(), name.into()));
+        }
+    }
+}
