@@ -6,7 +6,7 @@ use srrf_cloud::Rigid;
 
 use crate::Metric;
 use crate::matching::{median_distance, support_of};
-use crate::prepared::Level;
+use crate::prepared::CloudLevel;
 
 /// Iterations of the fit.
 const ITERATIONS: usize = 20;
@@ -41,7 +41,7 @@ impl Affine {
 }
 
 /// Fits an affine map from `pose` on and compares; `support` is that of the pose.
-pub(crate) fn affine_fit(source: &Level, target: &Level, pose: &Rigid, support: f64) -> AffineFit {
+pub(crate) fn affine_fit(source: &CloudLevel, target: &CloudLevel, pose: &Rigid, support: f64) -> AffineFit {
     let spacing = source.spacing.max(target.spacing);
     let end = END * spacing;
     let mut scale = (2.0 * median_distance(source, target, pose)).max(2.0 * spacing);
@@ -59,7 +59,7 @@ pub(crate) fn affine_fit(source: &Level, target: &Level, pose: &Rigid, support: 
 }
 
 /// The matches of both sides: source point, moved point, target point, normal in the target frame. None where the map has no inverse.
-fn matches(source: &Level, target: &Level, map: &Affine) -> Option<Vec<[Vector3<f64>; 4]>> {
+fn matches(source: &CloudLevel, target: &CloudLevel, map: &Affine) -> Option<Vec<[Vector3<f64>; 4]>> {
     let inverse = map.linear.try_inverse()?;
     let from_source = source.points().iter().map(|x| {
         let moved = map.apply(x);
@@ -77,7 +77,13 @@ fn matches(source: &Level, target: &Level, map: &Affine) -> Option<Vec<[Vector3<
     Some(from_source.chain(from_target).collect())
 }
 
-fn step(source: &Level, target: &Level, map: &Affine, rigid: &Affine, scale: f64) -> Option<Affine> {
+fn step(
+    source: &CloudLevel,
+    target: &CloudLevel,
+    map: &Affine,
+    rigid: &Affine,
+    scale: f64,
+) -> Option<Affine> {
     let mut hessian = SMatrix::<f64, 12, 12>::zeros();
     let mut right = SVector::<f64, 12>::zeros();
     let squared = scale * scale;
@@ -118,7 +124,7 @@ fn step(source: &Level, target: &Level, map: &Affine, rigid: &Affine, scale: f64
 }
 
 /// Root mean square distance between where the map moves the points and where the nearest rigid motion does.
-fn bend(source: &Level, map: &Affine) -> f64 {
+fn bend(source: &CloudLevel, map: &Affine) -> f64 {
     let n = source.points().len() as f64;
     let mean = source.points().iter().map(|p| Vector3::from(*p)).sum::<Vector3<f64>>() / n;
     let covariance: Matrix3<f64> = source
@@ -134,7 +140,7 @@ fn bend(source: &Level, map: &Affine) -> f64 {
 }
 
 /// [`crate::matching::support`] of an affine map.
-fn support_of_map(source: &Level, target: &Level, map: &Affine, spacing: f64) -> f64 {
+fn support_of_map(source: &CloudLevel, target: &CloudLevel, map: &Affine, spacing: f64) -> f64 {
     let Some(matches) = matches(source, target, map) else { return 0.0 };
     let squared: Vec<f64> =
         matches.iter().map(|[_, moved, fixed, _]| (moved - fixed).norm_squared()).collect();
@@ -152,7 +158,7 @@ mod tests {
 
     use super::*;
     use crate::matching::{both_sides, support};
-    use crate::prepared::{Prepared, to_local};
+    use crate::prepared::{RefineCloud, to_local};
 
     /// A pair that samples one shape twice.
     fn pair(corruption: Option<(CorruptionKind, Severity)>, item: u64) -> Pair {
@@ -174,7 +180,7 @@ mod tests {
     }
 
     fn between(source: &PointCloud, target: &PointCloud, pose: &Rigid) -> AffineFit {
-        let (source, target) = (Prepared::of(source), Prepared::of(target));
+        let (source, target) = (RefineCloud::of(source), RefineCloud::of(target));
         let (source, target, pose) = (source.coarse(), target.coarse(), to_local(pose, &source, &target));
         let support = support(&both_sides(source, target, &pose), source.spacing.max(target.spacing));
         affine_fit(source, target, &pose, support)
@@ -202,8 +208,8 @@ mod tests {
         let n = source.points().len() as f64;
         let spread = source.points().iter().map(|p| Vector3::from(*p).norm_squared()).sum::<f64>() / n;
         // What the map bends, by its definition, in root mean square over the points.
-        let prepared = Prepared::of(&source);
-        let spacing = Prepared::of(&target).coarse().spacing;
+        let prepared = RefineCloud::of(&source);
+        let spacing = RefineCloud::of(&target).coarse().spacing;
         let spacing = spacing.max(prepared.coarse().spacing);
         let want = bend(prepared.coarse(), &Affine { linear, shift: Vector3::zeros() }) / spacing;
         assert!(

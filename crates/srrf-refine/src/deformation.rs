@@ -5,7 +5,7 @@ use serde::Serialize;
 use srrf_cloud::{KnnIndex, Rigid};
 
 use crate::matching::{Side, side_matches};
-use crate::prepared::Level;
+use crate::prepared::CloudLevel;
 
 /// Neighbours of the same cloud whose residuals a residual is compared with.
 const NEIGHBOURS: usize = 6;
@@ -48,7 +48,11 @@ struct OneSide<'a> {
 }
 
 /// Measures the structure at `pose`.
-pub(crate) fn residual_structure(source: &Level, target: &Level, pose: &Rigid) -> ResidualStructure {
+pub(crate) fn residual_structure(
+    source: &CloudLevel,
+    target: &CloudLevel,
+    pose: &Rigid,
+) -> ResidualStructure {
     let spacing = source.spacing.max(target.spacing);
     let cap = CAP * spacing;
     let mut squares = Vec::new();
@@ -64,7 +68,8 @@ pub(crate) fn residual_structure(source: &Level, target: &Level, pose: &Rigid) -
             residual.iter().zip(&matches).map(|(r, m)| r.map(|r| m.normal * m.normal.dot(&r))).collect();
         OneSide { index, partner, residual, along }
     });
-    let (mut full, mut normal, mut across) = (Sums::default(), Sums::default(), Sums::default());
+    let (mut full, mut normal, mut across) =
+        (CorrelationSums::default(), CorrelationSums::default(), CorrelationSums::default());
     for side in &sides {
         full.add(side.index, &side.residual);
         normal.add(side.index, &side.along);
@@ -83,12 +88,12 @@ pub(crate) fn residual_structure(source: &Level, target: &Level, pose: &Rigid) -
 }
 
 #[derive(Default)]
-struct Sums {
+struct CorrelationSums {
     shared: f64,
     own: f64,
 }
 
-impl Sums {
+impl CorrelationSums {
     /// Residuals beside those of their neighbours in the same cloud.
     fn add(&mut self, index: &KnnIndex, residuals: &[Option<Vector3<f64>>]) {
         for (i, residual) in residuals.iter().enumerate() {
@@ -150,7 +155,7 @@ mod tests {
     use srrf_cloud::PointCloud;
 
     use super::*;
-    use crate::prepared::Prepared;
+    use crate::prepared::RefineCloud;
 
     /// Points where `at` puts pairs of numbers in [0, 1), `n` of them, of one sampling.
     fn sampled(seed: u64, n: usize, at: impl Fn(f64, f64) -> [f64; 3]) -> Vec<[f64; 3]> {
@@ -160,7 +165,7 @@ mod tests {
 
     /// The structure at the identity, of clouds that stay where they are.
     fn structure(source: Vec<[f64; 3]>, target: Vec<[f64; 3]>) -> ResidualStructure {
-        let prepared = |points| Prepared::of(&PointCloud::new(points).unwrap());
+        let prepared = |points| RefineCloud::of(&PointCloud::new(points).unwrap());
         let (source, target) = (prepared(source), prepared(target));
         let pose = crate::prepared::to_local(&Rigid::identity(), &source, &target);
         residual_structure(source.coarse(), target.coarse(), &pose)

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use srrf_cloud::Rigid;
 
-use crate::prepared::Level;
+use crate::prepared::CloudLevel;
 use crate::solve::{Match, NormalEquations};
 
 /// Points of one task: sums are taken chunk by chunk and added in order, so that the answer does
@@ -37,8 +37,8 @@ pub(crate) enum Side {
 
 /// The match of the `i`-th point of a side, after its index in the other cloud.
 pub(crate) fn nearest(
-    source: &Level,
-    target: &Level,
+    source: &CloudLevel,
+    target: &CloudLevel,
     pose: &Rigid,
     inverse: &Rigid,
     side: Side,
@@ -60,7 +60,12 @@ pub(crate) fn nearest(
 }
 
 /// The matches of a side, in the order of its points, each after its index in the other cloud.
-pub(crate) fn side_matches(source: &Level, target: &Level, pose: &Rigid, side: Side) -> Vec<(usize, Match)> {
+pub(crate) fn side_matches(
+    source: &CloudLevel,
+    target: &CloudLevel,
+    pose: &Rigid,
+    side: Side,
+) -> Vec<(usize, Match)> {
     let n = if side == Side::Source { source.points().len() } else { target.points().len() };
     let inverse = pose.inverse();
     let parts = chunked(n, |range| {
@@ -72,8 +77,8 @@ pub(crate) fn side_matches(source: &Level, target: &Level, pose: &Rigid, side: S
 /// Normal equations over the matches of every `stride`-th point of both sides. `weigh` gives the
 /// metric `(a, b)` of a match, or `None` to leave it out.
 pub(crate) fn equations(
-    source: &Level,
-    target: &Level,
+    source: &CloudLevel,
+    target: &CloudLevel,
     pose: &Rigid,
     stride: usize,
     weigh: impl Fn(&Match) -> Option<(f64, f64)> + Sync,
@@ -100,7 +105,7 @@ pub(crate) fn equations(
 pub(crate) type BothSides = [Vec<(usize, Match)>; 2];
 
 /// The matches of both sides.
-pub(crate) fn both_sides(source: &Level, target: &Level, pose: &Rigid) -> BothSides {
+pub(crate) fn both_sides(source: &CloudLevel, target: &CloudLevel, pose: &Rigid) -> BothSides {
     [Side::Source, Side::Target].map(|side| side_matches(source, target, pose, side))
 }
 
@@ -111,7 +116,7 @@ fn squared_distances(matches: &BothSides) -> [Vec<f64>; 2] {
 }
 
 /// Median distance over the matches of both sides.
-pub(crate) fn median_distance(source: &Level, target: &Level, pose: &Rigid) -> f64 {
+pub(crate) fn median_distance(source: &CloudLevel, target: &CloudLevel, pose: &Rigid) -> f64 {
     let [mut all, more] = squared_distances(&both_sides(source, target, pose));
     all.extend(more);
     let middle = all.len() / 2;
@@ -165,16 +170,16 @@ mod tests {
     use srrf_cloud::PointCloud;
 
     use super::*;
-    use crate::prepared::{Prepared, to_local};
+    use crate::prepared::{RefineCloud, to_local};
 
     /// Points of a saddle, by chance.
-    fn saddle(seed: u64) -> Prepared {
+    fn saddle(seed: u64) -> RefineCloud {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let points = (0..600).map(|_| {
             let [x, y]: [f64; 2] = rng.random();
             [x, y, 0.4 * (x - 0.5) * (y - 0.4)]
         });
-        Prepared::of(&PointCloud::new(points.collect()).unwrap())
+        RefineCloud::of(&PointCloud::new(points.collect()).unwrap())
     }
 
     #[test]

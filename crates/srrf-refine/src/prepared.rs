@@ -1,4 +1,4 @@
-//! [`Prepared`]: a cloud centred, thinned, indexed, with normals.
+//! [`RefineCloud`]: a cloud centred, thinned, indexed, with normals.
 
 use nalgebra::Vector3;
 use srrf_cloud::{
@@ -9,7 +9,7 @@ use crate::RefineConfig;
 
 /// One resolution of a cloud.
 #[derive(Debug)]
-pub(crate) struct Level {
+pub(crate) struct CloudLevel {
     /// The centred points and their tree.
     pub index: KnnIndex,
     /// Unit normals, one a point.
@@ -18,7 +18,7 @@ pub(crate) struct Level {
     pub spacing: f64,
 }
 
-impl Level {
+impl CloudLevel {
     fn new(points: &[[f64; 3]], neighbours: usize) -> Result<Self, CloudError> {
         let index = KnnIndex::new(points)?;
         let normals = estimate_normals(points, neighbours)?.into_iter().map(Vector3::from).collect();
@@ -34,17 +34,17 @@ impl Level {
 
 /// A cloud made ready for refinement.
 #[derive(Debug)]
-pub(crate) struct Prepared {
+pub(crate) struct RefineCloud {
     /// Mean of the points, in the coordinates of the input; levels are relative to it.
     pub centre: Vector3<f64>,
     /// Root mean square distance of the points from the centre.
     pub radius: f64,
     /// Few points, for starts and first iterations; `None` where the cloud is small anyway.
-    coarse: Option<Level>,
-    fine: Level,
+    coarse: Option<CloudLevel>,
+    fine: CloudLevel,
 }
 
-impl Prepared {
+impl RefineCloud {
     pub fn new(cloud: Solid<'_>, config: &RefineConfig) -> Result<Self, CloudError> {
         let centre = cloud.centroid();
         let centred: Vec<[f64; 3]> =
@@ -52,7 +52,8 @@ impl Prepared {
         let squares: f64 = centred.iter().map(|p| Vector3::from(*p).norm_squared()).sum();
         let radius = (squares / centred.len() as f64).sqrt();
         let centred = PointCloud::new(centred)?;
-        let level = |most| Level::new(thin_to(&centred, most, radius).points(), config.normal_neighbours);
+        let level =
+            |most| CloudLevel::new(thin_to(&centred, most, radius).points(), config.normal_neighbours);
         let fine = level(config.max_points)?;
         let coarse = if fine.points().len() > config.coarse_points {
             Some(level(config.coarse_points)?)
@@ -73,11 +74,11 @@ impl Prepared {
         Self::new(Solid::new(cloud).unwrap(), &RefineConfig::default()).unwrap()
     }
 
-    pub fn coarse(&self) -> &Level {
+    pub fn coarse(&self) -> &CloudLevel {
         self.coarse.as_ref().unwrap_or(&self.fine)
     }
 
-    pub fn fine(&self) -> &Level {
+    pub fn fine(&self) -> &CloudLevel {
         &self.fine
     }
 
@@ -87,11 +88,11 @@ impl Prepared {
 }
 
 /// `pose` between the inputs as a pose between the centred clouds.
-pub(crate) fn to_local(pose: &Rigid, source: &Prepared, target: &Prepared) -> Rigid {
+pub(crate) fn to_local(pose: &Rigid, source: &RefineCloud, target: &RefineCloud) -> Rigid {
     source.frame_to(target).pose(pose)
 }
 
 /// The way back from [`to_local`].
-pub(crate) fn to_global(pose: &Rigid, source: &Prepared, target: &Prepared) -> Rigid {
+pub(crate) fn to_global(pose: &Rigid, source: &RefineCloud, target: &RefineCloud) -> Rigid {
     source.frame_to(target).undo_pose(pose)
 }

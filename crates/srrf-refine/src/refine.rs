@@ -8,8 +8,8 @@ use crate::affine::{AffineFit, affine_fit};
 use crate::deformation::{ResidualStructure, residual_structure};
 use crate::evidence::{Evidence, evidence};
 use crate::matching::{BothSides, both_sides, plane_support, support};
-use crate::prepared::{Prepared, to_global, to_local};
-use crate::robust::{Descent, Schedule, descend};
+use crate::prepared::{RefineCloud, to_global, to_local};
+use crate::robust::{Descent, ScaleSchedule, descend};
 use crate::soft::soft;
 use crate::verdict::{self, Verdict};
 use crate::{Deformed, Metric, Ranking, RefineConfig, RefineError};
@@ -64,13 +64,13 @@ pub struct Refinement {
 }
 
 /// One source, one target.
-pub(crate) struct Run<'a> {
-    pub source: &'a Prepared,
-    pub target: &'a Prepared,
+pub(crate) struct RefineRun<'a> {
+    pub source: &'a RefineCloud,
+    pub target: &'a RefineCloud,
     pub config: &'a RefineConfig,
 }
 
-impl Run<'_> {
+impl RefineRun<'_> {
     /// Short runs of all starts, or just the support of a single one.
     pub fn shortlist(&self, starts: &[Rigid]) -> Vec<StartSupport> {
         let run = |given: &Rigid, short: bool| {
@@ -180,7 +180,7 @@ impl Run<'_> {
         to_local(pose, self.source, self.target)
     }
 
-    /// The way back from [`Run::local`].
+    /// The way back from [`RefineRun::local`].
     fn global(&self, pose: &Rigid) -> Rigid {
         to_global(pose, self.source, self.target)
     }
@@ -188,10 +188,10 @@ impl Run<'_> {
     /// A few iterations on the coarse level.
     fn short_run(&self, start: &Rigid) -> Rigid {
         let (s, t) = (self.source.coarse(), self.target.coarse());
-        let schedule = Schedule {
+        let schedule = ScaleSchedule {
             iterations: self.config.start_iterations,
             first_stride: s.points().len().max(t.points().len()).div_ceil(512),
-            ..Schedule::new(s, t, start, self.target.radius, self.config)
+            ..ScaleSchedule::new(s, t, start, self.target.radius, self.config)
         };
         self.descend_on(false, start, &schedule, self.config.metric).pose
     }
@@ -212,11 +212,11 @@ impl Run<'_> {
         let config = self.config;
         let two_levels = self.source.has_coarse() || self.target.has_coarse();
         let (s, t) = (self.source.coarse(), self.target.coarse());
-        let schedule = Schedule::new(s, t, start, self.target.radius, config);
+        let schedule = ScaleSchedule::new(s, t, start, self.target.radius, config);
         let mut stage = self.descend_on(false, start, &schedule, config.metric);
         if two_levels {
             let (s, t) = (self.source.fine(), self.target.fine());
-            let schedule = Schedule::new(s, t, &stage.pose, self.target.radius, config);
+            let schedule = ScaleSchedule::new(s, t, &stage.pose, self.target.radius, config);
             stage = after(stage, self.descend_on(true, &stage.pose, &schedule, config.metric));
         }
         let (s, t) = (self.source.fine(), self.target.fine());
@@ -229,12 +229,12 @@ impl Run<'_> {
     /// Point to point down to three tenths of the spacing: moves little where there is no exact fit.
     fn cautious_run(&self, start: &Rigid) -> Descent {
         let (s, t) = (self.source.coarse(), self.target.coarse());
-        let schedule = Schedule::new(s, t, start, self.target.radius, self.config);
-        let schedule = Schedule { end: 0.6 * schedule.end, ..schedule };
+        let schedule = ScaleSchedule::new(s, t, start, self.target.radius, self.config);
+        let schedule = ScaleSchedule { end: 0.6 * schedule.end, ..schedule };
         self.descend_on(false, start, &schedule, Metric::PointToPoint)
     }
 
-    fn descend_on(&self, fine: bool, start: &Rigid, schedule: &Schedule, metric: Metric) -> Descent {
+    fn descend_on(&self, fine: bool, start: &Rigid, schedule: &ScaleSchedule, metric: Metric) -> Descent {
         let (s, t) = if fine {
             (self.source.fine(), self.target.fine())
         } else {

@@ -3,7 +3,7 @@
 use srrf_cloud::Rigid;
 
 use crate::matching::{equations, median_distance, motion};
-use crate::prepared::Level;
+use crate::prepared::CloudLevel;
 use crate::{Metric, RefineConfig};
 
 /// Where a stage ended.
@@ -16,7 +16,7 @@ pub(crate) struct Descent {
 
 /// How the kernel's scale runs.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Schedule {
+pub(crate) struct ScaleSchedule {
     pub start: f64,
     pub end: f64,
     pub shrink: f64,
@@ -25,9 +25,15 @@ pub(crate) struct Schedule {
     pub first_stride: usize,
 }
 
-impl Schedule {
+impl ScaleSchedule {
     /// The schedule of `config` from the residuals at `pose`.
-    pub fn new(source: &Level, target: &Level, pose: &Rigid, radius: f64, config: &RefineConfig) -> Self {
+    pub fn new(
+        source: &CloudLevel,
+        target: &CloudLevel,
+        pose: &Rigid,
+        radius: f64,
+        config: &RefineConfig,
+    ) -> Self {
         let spacing = source.spacing.max(target.spacing);
         let median = median_distance(source, target, pose);
         let start = (config.start_residuals * median).max(2.0 * spacing).min((0.25 * radius).max(spacing));
@@ -40,12 +46,12 @@ impl Schedule {
 /// `(s^2 / (s^2 + r^2))^2` (Geman and McClure 1985; the kernel of KISS-ICP), `r` the distance of the
 /// two points whatever the metric.
 pub(crate) fn descend(
-    source: &Level,
-    target: &Level,
+    source: &CloudLevel,
+    target: &CloudLevel,
     pose: &Rigid,
     radius: f64,
     metric: Metric,
-    schedule: &Schedule,
+    schedule: &ScaleSchedule,
     tolerance: f64,
 ) -> Descent {
     let (a, b) = metric.weights();

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use srrf_cloud::Rigid;
 
 use crate::matching::motion;
-use crate::prepared::Level;
+use crate::prepared::CloudLevel;
 use crate::robust::Descent;
 use crate::solve::{Match, NormalEquations};
 
@@ -26,7 +26,13 @@ const OUTLIER: f64 = 0.01;
 /// with the weight of an outlier; `s` follows from the matches, starts at 0.7 of the point spacing, and
 /// goes to zero where points coincide. Nearest neighbours, in contrast, always choose the candidate
 /// that agrees with the current pose, and so hardly move it.
-pub(crate) fn soft(source: &Level, target: &Level, pose: &Rigid, radius: f64, tolerance: f64) -> Descent {
+pub(crate) fn soft(
+    source: &CloudLevel,
+    target: &CloudLevel,
+    pose: &Rigid,
+    radius: f64,
+    tolerance: f64,
+) -> Descent {
     let spacing = source.spacing.max(target.spacing);
     let smallest = 1e-3 * spacing;
     let mut deviation = 0.7 * spacing;
@@ -37,7 +43,7 @@ pub(crate) fn soft(source: &Level, target: &Level, pose: &Rigid, radius: f64, to
         let back = candidates(source, target.points(), &inverse);
         for _ in 0..STEPS {
             let moved: Vec<[f64; 3]> = source.points().iter().map(|p| stage.pose.apply(p)).collect();
-            let mut sums = Sums { scale: 0.5 / (deviation * deviation), ..Sums::default() };
+            let mut sums = SoftSums { scale: 0.5 / (deviation * deviation), ..SoftSums::default() };
             for (x, near) in moved.iter().zip(&forth) {
                 if let Some((mean, w)) = sums.expect(x, near, target.points()) {
                     let found = Match { moved: (*x).into(), fixed: mean, normal: Vector3::zeros() };
@@ -62,12 +68,12 @@ pub(crate) fn soft(source: &Level, target: &Level, pose: &Rigid, radius: f64, to
 }
 
 /// The nearest points of `level` to each of `points` moved by `pose`.
-fn candidates(level: &Level, points: &[[f64; 3]], pose: &Rigid) -> Vec<Vec<(usize, f64)>> {
+fn candidates(level: &CloudLevel, points: &[[f64; 3]], pose: &Rigid) -> Vec<Vec<(usize, f64)>> {
     points.iter().map(|p| level.index.k_nearest(&pose.apply(p), CANDIDATES)).collect()
 }
 
 #[derive(Default)]
-struct Sums {
+struct SoftSums {
     /// `1 / 2 s^2`.
     scale: f64,
     equations: NormalEquations,
@@ -77,7 +83,7 @@ struct Sums {
     squares: f64,
 }
 
-impl Sums {
+impl SoftSums {
     /// The mean of the candidates by probability, and the probability of being matched at all.
     fn expect(
         &mut self,

@@ -3,21 +3,21 @@
 use srrf_cloud::{PointCloud, Rigid, Solid};
 
 use crate::evidence::{Evidence, evidence};
-use crate::prepared::Prepared;
-use crate::refine::{Refinement, Run, StartSupport};
+use crate::prepared::RefineCloud;
+use crate::refine::{RefineRun, Refinement, StartSupport};
 use crate::{RefineConfig, RefineError};
 
 /// A target made ready, to refine the poses of many sources.
 #[derive(Debug)]
 pub struct RefineTarget {
     config: RefineConfig,
-    prepared: Prepared,
+    prepared: RefineCloud,
 }
 
 /// A source made ready by [`RefineTarget::source`], to refine many of its poses.
 #[derive(Debug)]
 pub struct RefineSource {
-    prepared: Prepared,
+    prepared: RefineCloud,
 }
 
 impl RefineTarget {
@@ -27,7 +27,7 @@ impl RefineTarget {
     /// [`RefineError::Config`], and [`RefineError::Target`] for a cloud that spans more than the largest number.
     pub fn new(target: Solid<'_>, config: &RefineConfig) -> Result<Self, RefineError> {
         config.validate()?;
-        let prepared = Prepared::new(target, config).map_err(RefineError::Target)?;
+        let prepared = RefineCloud::new(target, config).map_err(RefineError::Target)?;
         Ok(Self { config: *config, prepared })
     }
 
@@ -41,7 +41,7 @@ impl RefineTarget {
     /// # Errors
     /// [`RefineError::Source`] for a cloud that spans more than the largest number.
     pub fn source(&self, source: Solid<'_>) -> Result<RefineSource, RefineError> {
-        let prepared = Prepared::new(source, &self.config).map_err(RefineError::Source)?;
+        let prepared = RefineCloud::new(source, &self.config).map_err(RefineError::Source)?;
         Ok(RefineSource { prepared })
     }
 
@@ -85,8 +85,8 @@ impl RefineTarget {
         self.run(source).finish(starts)
     }
 
-    fn run<'a>(&'a self, source: &'a RefineSource) -> Run<'a> {
-        Run { source: &source.prepared, target: &self.prepared, config: &self.config }
+    fn run<'a>(&'a self, source: &'a RefineSource) -> RefineRun<'a> {
+        RefineRun { source: &source.prepared, target: &self.prepared, config: &self.config }
     }
 }
 

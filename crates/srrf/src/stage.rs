@@ -30,6 +30,8 @@ pub enum Stage {
     NetworkAllAround,
     /// Ranking and refining after that.
     RefineAgain,
+    /// A source of starts of one's own, by its name.
+    Own(&'static str),
 }
 
 impl fmt::Display for Stage {
@@ -46,6 +48,7 @@ impl fmt::Display for Stage {
             Self::RefineWider => "refine, wider",
             Self::NetworkAllAround => "network, 23 orientations",
             Self::RefineAgain => "refine again",
+            Self::Own(name) => name,
         })
     }
 }

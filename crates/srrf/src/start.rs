@@ -24,6 +24,8 @@ pub enum Start {
     Icp,
     /// The first guess itself.
     Given,
+    /// A source of starts of one's own, by its name.
+    Own(&'static str),
 }
 
 impl Start {
@@ -34,6 +36,7 @@ impl Start {
             Self::FpfhRansac { .. } => Method::FpfhRansac,
             Self::Icp => Method::Icp,
             Self::Given => Method::Given,
+            Self::Own(_) => Method::Auto,
         }
     }
 }
@@ -47,6 +50,7 @@ impl fmt::Display for Start {
             Self::FpfhRansac { .. } => f.write_str("fpfh-ransac"),
             Self::Icp => f.write_str("icp"),
             Self::Given => f.write_str("given"),
+            Self::Own(name) => f.write_str(name),
         }
     }
 }
@@ -71,6 +75,7 @@ mod tests {
             (Start::FpfhRansac { feature_voxels: 8.0 }, "fpfh-ransac"),
             (Start::Icp, "icp"),
             (Start::Given, "given"),
+            (Start::Own("compass"), "compass"),
         ];
         for (start, name) in names {
             assert_eq!((start.to_string(), serde_json::to_value(start).unwrap()), (name.into(), name.into()));

@@ -18,7 +18,7 @@ pub struct Target(pub(crate) Arc<TargetParts>);
 /// All that depends on the target alone.
 #[derive(Debug)]
 pub(crate) struct TargetParts {
-    pub side: Side,
+    pub side: PreparedCloud,
     pub refine: RefineTarget,
     /// Time that it took.
     pub seconds: f64,
@@ -26,7 +26,7 @@ pub(crate) struct TargetParts {
 
 /// One cloud of a pair, as the sources of starts want it.
 #[derive(Debug)]
-pub(crate) struct Side {
+pub(crate) struct PreparedCloud {
     /// About its own centre.
     pub centred: CentredCloud,
     /// An even part of it, which the network looks at.
@@ -35,7 +35,7 @@ pub(crate) struct Side {
     described: OnceLock<FpfhCloud<'static>>,
 }
 
-impl Side {
+impl PreparedCloud {
     fn new(cloud: &PointCloud, options: &Options) -> Result<Self, CloudError> {
         let centred = CentredCloud::new(cloud)?;
         let thin = thinned(&centred.cloud());
@@ -61,7 +61,7 @@ impl Side {
 impl Target {
     pub(crate) fn new(target: &PointCloud, options: &Options) -> Result<Self, Error> {
         let begun = Instant::now();
-        let side = Side::new(target, options).map_err(Error::Target)?;
+        let side = PreparedCloud::new(target, options).map_err(Error::Target)?;
         let config = options.refine.unwrap_or_default();
         let refine = RefineTarget::new(side.centred.cloud(), &config).map_err(Error::Refine)?;
         Ok(Self(Arc::new(TargetParts { side, refine, seconds: begun.elapsed().as_secs_f64() })))
@@ -71,7 +71,7 @@ impl Target {
 /// A source and its target, both checked, centred, thinned and indexed. Poses in a search are between the centred clouds.
 #[derive(Debug)]
 pub(crate) struct PreparedPair {
-    pub source: Side,
+    pub source: PreparedCloud,
     pub refine: RefineSource,
     pub target: Target,
     /// Between the inputs and the centred clouds.
@@ -87,14 +87,14 @@ impl PreparedPair {
         initial: &Rigid,
         options: &Options,
     ) -> Result<Self, Error> {
-        let source = Side::new(source, options).map_err(Error::Source)?;
+        let source = PreparedCloud::new(source, options).map_err(Error::Source)?;
         let frame = source.centred.frame_to(&target.0.side.centred);
         let refine = target.0.refine.source(source.centred.cloud()).map_err(Error::Refine)?;
         Ok(Self { source, refine, target, frame, initial: frame.pose(initial) })
     }
 
     /// What is known of the target.
-    pub fn target_side(&self) -> &Side {
+    pub fn target_side(&self) -> &PreparedCloud {
         &self.target.0.side
     }
 }

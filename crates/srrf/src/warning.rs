@@ -47,7 +47,7 @@ impl fmt::Display for Warning {
                     Method::Srrf => "The network",
                     Method::FpfhRansac => "FPFH with RANSAC",
                     Method::Icp => "ICP",
-                    Method::Auto | Method::Given => "The first guess",
+                    Method::Auto | Method::Given => "The search",
                 };
                 write!(f, "{who} found no pose: {why}.")
             }

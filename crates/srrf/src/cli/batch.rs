@@ -11,8 +11,8 @@ use rayon::ThreadPoolBuilder;
 use serde_json::{Value, json};
 use srrf::{Registrar, Request};
 
-use super::batch_output::Results;
-use super::batch_pairs::{PairRow, Pairs};
+use super::batch_output::ResultLines;
+use super::batch_pairs::{ListedPair, PairList};
 use super::common::{failed, left_out, to_json, unusable};
 use super::method::MethodArgs;
 use super::transform;
@@ -57,11 +57,11 @@ pub struct BatchArgs {
 pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
     files::check_output(&args.output)?;
     let threads = args.common.threads.start()?;
-    let pairs = Pairs::read(&args.pairs)?;
+    let pairs = PairList::read(&args.pairs)?;
     let registrar = Registrar::new(args.method.options()).map_err(unusable)?;
     let described = args.describe();
-    let (results, done) = Results::open(&args.output, &pairs.rows, &described)?;
-    let todo: Vec<&PairRow> = pairs.rows.iter().filter(|row| !done.contains_key(&row.number)).collect();
+    let (results, done) = ResultLines::open(&args.output, &pairs.rows, &described)?;
+    let todo: Vec<&ListedPair> = pairs.rows.iter().filter(|row| !done.contains_key(&row.number)).collect();
     let out = Output::new(args.common.quiet.quiet, files::is_stream(&args.output));
     if !done.is_empty() {
         out.say(&format!("{} of {} done already", count(done.len()), pairs_of(pairs.rows.len())));
@@ -113,7 +113,7 @@ struct Tally {
 }
 
 struct Batch<'a> {
-    pairs: &'a Pairs,
+    pairs: &'a PairList,
     registrar: &'a Registrar,
     described: &'a Value,
 }
@@ -123,9 +123,9 @@ impl Batch<'_> {
     /// none waits for another.
     fn run(
         &self,
-        todo: &[&PairRow],
+        todo: &[&ListedPair],
         threads: usize,
-        results: Results,
+        results: ResultLines,
         bar: &ProgressBar,
     ) -> Result<Tally, Failure> {
         let workers = threads.min(todo.len()).max(1);
@@ -168,7 +168,7 @@ impl Batch<'_> {
     }
 
     /// The line of a pair, and whether its pose is doubtful; `None` without a pose.
-    fn line(&self, row: &PairRow) -> (Value, Option<bool>) {
+    fn line(&self, row: &ListedPair) -> (Value, Option<bool>) {
         let (mut value, abstain) = match self.register(row) {
             Ok((value, abstain)) => (value, Some(abstain)),
             Err(failure) => {
@@ -183,7 +183,7 @@ impl Batch<'_> {
         (value, abstain)
     }
 
-    fn register(&self, row: &PairRow) -> Result<(Value, bool), Failure> {
+    fn register(&self, row: &ListedPair) -> Result<(Value, bool), Failure> {
         let source = files::read_solid(&self.pairs.path(&row.source), None)?;
         let target = files::read_solid(&self.pairs.path(&row.target), None)?;
         let initial = row.initial.as_ref().map(|file| transform::read(&self.pairs.path(file))).transpose()?;

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::batch_pairs::PairRow;
+use super::batch_pairs::ListedPair;
 use srrf_args::Failure;
 use srrf_args::{files, interrupt};
 
 /// A file of results that is being filled.
-pub struct Results {
+pub struct ResultLines {
     path: PathBuf,
     out: Box<dyn Write + Send>,
     /// The place in the order whose line comes next.
@@ -21,7 +21,7 @@ pub struct Results {
     waiting: BTreeMap<usize, String>,
 }
 
-impl Results {
+impl ResultLines {
     /// Opens a file, and finds the pairs that are in it already, of an interrupted run: their numbers, and
     /// whether they have a pose.
     ///
@@ -30,7 +30,7 @@ impl Results {
     /// [`Failure::failed`] where it cannot be written.
     pub fn open(
         path: &Path,
-        rows: &[PairRow],
+        rows: &[ListedPair],
         options: &Value,
     ) -> Result<(Self, BTreeMap<usize, bool>), Failure> {
         if files::is_stream(path) {
@@ -83,7 +83,7 @@ impl Results {
 /// The pairs in a file of results, and whether they have a pose. The error is the line and what is wrong with it.
 fn finished(
     text: &[u8],
-    rows: &[PairRow],
+    rows: &[ListedPair],
     options: &Value,
 ) -> Result<BTreeMap<usize, bool>, (usize, String)> {
     let mut done = BTreeMap::new();
@@ -117,8 +117,8 @@ mod tests {
 
     use super::*;
 
-    fn rows() -> Vec<PairRow> {
-        let row = |number, source: &str| PairRow {
+    fn rows() -> Vec<ListedPair> {
+        let row = |number, source: &str| ListedPair {
             number,
             source: source.into(),
             target: "t".into(),
@@ -137,7 +137,7 @@ mod tests {
         let path = folder.path().join("r.jsonl");
         let options = json!({ "seed": 1 });
         std::fs::write(&path, format!("{}\n{{\"pair\": 2, \"sou", line(1, "a"))).unwrap();
-        let (mut results, done) = Results::open(&path, &rows(), &options).unwrap();
+        let (mut results, done) = ResultLines::open(&path, &rows(), &options).unwrap();
         assert_eq!(done, BTreeMap::from([(1, true)]));
         results.put(1, &line(3, "c")).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 1);
@@ -145,7 +145,7 @@ mod tests {
         without["error"] = json!("no pose");
         results.put(0, &without).unwrap();
         drop(results);
-        let (_, done) = Results::open(&path, &rows(), &options).unwrap();
+        let (_, done) = ResultLines::open(&path, &rows(), &options).unwrap();
         assert_eq!(done, BTreeMap::from([(1, true), (2, false), (3, true)]));
         let text = std::fs::read_to_string(&path).unwrap();
         let order: Vec<u64> = text

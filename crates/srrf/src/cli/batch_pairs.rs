@@ -8,7 +8,7 @@ use srrf_args::Failure;
 
 /// One line of the list.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PairRow {
+pub struct ListedPair {
     /// Its number, from 1; the line of the names does not count.
     pub number: usize,
     /// The source as written.
@@ -21,13 +21,13 @@ pub struct PairRow {
 
 /// The pairs of a batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Pairs {
+pub struct PairList {
     /// In the order of the file.
-    pub rows: Vec<PairRow>,
+    pub rows: Vec<ListedPair>,
     folder: PathBuf,
 }
 
-impl Pairs {
+impl PairList {
     /// Reads the list. Its first line names the columns: `source`, `target` and, if wanted, `initial`;
     /// others are passed over.
     ///
@@ -47,7 +47,7 @@ impl Pairs {
     }
 }
 
-fn parse(bytes: &[u8]) -> Result<Vec<PairRow>, String> {
+fn parse(bytes: &[u8]) -> Result<Vec<ListedPair>, String> {
     // Spreadsheets begin their files with a byte order mark.
     let mut records = records(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))?.into_iter();
     let (_, names) = records.next().ok_or("it is empty; its first line should be `source,target`")?;
@@ -68,7 +68,7 @@ fn parse(bytes: &[u8]) -> Result<Vec<PairRow>, String> {
                 names.len()
             ));
         }
-        let row = PairRow {
+        let row = ListedPair {
             number,
             source: fields[source].clone(),
             target: fields[target].clone(),

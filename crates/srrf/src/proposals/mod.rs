@@ -1,6 +1,7 @@
 //! Where starts come from: [`Proposals`], one implementation a file.
 //!
-//! A new source of starts is one file here and one line in [`SOURCES`].
+//! A new source of starts is one file here, named below and in one line of [`SOURCES`]. Its poses are
+//! [`Start::Own`] and its time is [`Stage::Own`], until it deserves names that results keep.
 
 mod given;
 mod global;
