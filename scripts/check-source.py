@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Rules of the house that no compiler knows. Fails and says where, if one is broken.
 
-    python3 scripts/check_source.py [circles|lines|names|readme ...] [--root FOLDER]     (default: all four)
+    python3 scripts/check-source.py [circles|lines|names|readme ...] [--root FOLDER]     (default: all four)
 
 circles  no two files of a crate import each other, over however many others: the graph has an arrow from a
          file to each file whose items it names (`use`, or a path in the code; a re-export is followed to where

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Keeps `cargo build -p X` from compiling a dependency again that the built workspace has.
 
-    python3 scripts/workspace_hack.py          # nothing compiled twice? (compiles members at most; CI)
-    python3 scripts/workspace_hack.py --write  # writes crates/workspace-hack/Cargo.toml anew, then `cargo check`
+    python3 scripts/workspace-hack.py          # nothing compiled twice? (compiles members at most; CI)
+    python3 scripts/workspace-hack.py --write  # writes crates/workspace-hack/Cargo.toml anew, then `cargo check`
 
 Cargo gives a dependency the features that the chosen members ask for, so one member alone may get it with other
 features than all of them together, and with it everything above. The crate `workspace-hack`, on which every member
@@ -21,7 +21,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = ROOT / "crates/workspace-hack/Cargo.toml"
-MARK = "# Written by scripts/workspace_hack.py from here on.\n"
+MARK = "# Written by scripts/workspace-hack.py from here on.\n"
 sys.setrecursionlimit(10_000)
 
 
@@ -99,7 +99,7 @@ def check():
         wrong += len(again)
         print(f"cargo build -p {member}: {len(again)} dependencies compiled again {' '.join(sorted(again))}")
     if wrong:
-        sys.exit("run `python3 scripts/workspace_hack.py --write`, and see that each member depends on workspace-hack")
+        sys.exit("run `python3 scripts/workspace-hack.py --write`, and see that each member depends on workspace-hack")
 
 
 if __name__ == "__main__":
