@@ -13,14 +13,16 @@ each. numpy uses one thread, but for its matrix products. Needs numpy and cargo.
 import argparse
 import json
 import subprocess
+import sys
 import time
 from datetime import date
 from pathlib import Path
 
-import corruption_fixtures as slow
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "crates/srrf-corrupt/tests/fixtures"))
+import corruption_fixtures as slow  # noqa: E402
 POINTS = 1024
 LONGEST = 4.0  # seconds that a corruption of numpy is timed for; it gets through fewer clouds then
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The SRRF network in batched PyTorch, made for speed: what the crate's times are compared with.
 
-    python3 scripts/speed_reference.py --check                 # against scripts/reference_network.py
+    python3 scripts/speed_reference.py --check                 # against reference_network.py
     python3 scripts/speed_reference.py --figure registration_step --threads 2
     python3 scripts/speed_reference.py                         # all figures, each in a process of its own
 
@@ -451,6 +451,7 @@ def skeleton_losses(factors, clouds, skeletons, radii, truth):
 def check():
     """Values and gradients against the slow network, in f64, on its small sizes."""
     sys.path.insert(0, str(Path(__file__).parent))
+    sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "crates/srrf-model/tests/fixtures"))
     import parity_reference as parity
     import reference_network as slow
 

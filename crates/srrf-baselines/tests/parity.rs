@@ -1,7 +1,7 @@
 //! The learned baselines against an implementation of its own, in PyTorch:
 //!
 //! ```text
-//! python3 scripts/baseline_reference.py crates/srrf-baselines/tests/fixtures/parity.json
+//! python3 crates/srrf-baselines/tests/fixtures/baseline_reference.py crates/srrf-baselines/tests/fixtures/parity.json
 //! ```
 //!
 //! Poses as at inference, every loss, and the gradient of every parameter, at small sizes. The reference

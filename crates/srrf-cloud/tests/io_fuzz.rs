@@ -10,6 +10,7 @@ mod samples;
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::Read;
 use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -80,6 +81,33 @@ fn seeds_keep_the_promises() {
             (0..bytes.len()).step_by(7).for_each(|length| check::check(Some(parser), &bytes[..length]));
         }
     }
+}
+
+/// What the fuzzers in `fuzz/` found new, each input through the function of its fuzzer, without libFuzzer.
+#[test]
+fn the_corpus_keeps_the_promises() {
+    let packed = fs::File::open(folder().join("../corpus.tar.gz")).unwrap();
+    let mut corpus = tar::Archive::new(flate2::read::GzDecoder::new(packed));
+    let mut replayed: BTreeMap<String, usize> = BTreeMap::new();
+    for entry in corpus.entries().unwrap() {
+        let mut entry = entry.unwrap();
+        if !entry.header().entry_type().is_file() {
+            continue;
+        }
+        let path = entry.path().unwrap().into_owned();
+        let fuzzer = path.parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned();
+        let format = (fuzzer != "detect").then_some(fuzzer.as_str());
+        if format.is_some_and(|format| !format_names().contains(&format)) {
+            continue; // not in this build
+        }
+        let mut bytes = Vec::new();
+        entry.read_to_end(&mut bytes).unwrap();
+        check::check(format, &bytes);
+        *replayed.entry(fuzzer).or_default() += 1;
+    }
+    let expected = check::FORMATS.into_iter().filter(|name| format_names().contains(name)).count() + 1;
+    assert_eq!(replayed.len(), expected, "{replayed:?}");
+    assert!(replayed.values().all(|&inputs| inputs > 500), "{replayed:?}");
 }
 
 /// Words that parsers trip over.

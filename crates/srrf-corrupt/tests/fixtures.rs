@@ -1,4 +1,4 @@
-//! Agreement with the numpy implementation in `scripts/corruption_fixtures.py`, which shares no
+//! Agreement with the numpy implementation in `fixtures/corruption_fixtures.py`, which shares no
 //! code with this crate and wrote `tests/fixtures`.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests")]

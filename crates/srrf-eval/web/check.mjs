@@ -116,4 +116,4 @@ for (const width of [390]) {
   await narrow.page.close();
 }
 await browser.close();
-console.log('check-report: everything works');
+console.log('the report: everything works');

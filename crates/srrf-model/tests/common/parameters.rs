@@ -1,4 +1,4 @@
-//! Parameters that the reference implementations in `scripts/` make too, and what stands for their
+//! Parameters that the reference implementations in `tests/fixtures` make too, and what stands for their
 //! gradients.
 
 use std::collections::BTreeMap;

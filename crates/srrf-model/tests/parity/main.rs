@@ -1,7 +1,7 @@
 //! The network against an implementation of its own, in PyTorch:
 //!
 //! ```text
-//! python3 scripts/parity_reference.py crates/srrf-model/tests/fixtures/parity.json
+//! python3 crates/srrf-model/tests/fixtures/parity_reference.py crates/srrf-model/tests/fixtures/parity.json
 //! ```
 //!
 //! The reference computes in `f64`. Here every part runs twice, and a tensor's largest error is
