@@ -109,7 +109,13 @@ impl NetworkConfig for DcpConfig {
 }
 
 impl DcpConfig {
-    fn forward(&self, network: &Dcp, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Result<Pose, CopyError> {
+    fn forward(
+        &self,
+        network: &Dcp,
+        source: Tensor<3>,
+        target: Tensor<3>,
+        phase: f32,
+    ) -> Result<Pose, CopyError> {
         let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
         let tokens = even_tokens(clouds.clone(), self.tokens, phase)?; // [2 batch, n, 3]
         let (features, _) = network.embedding.forward(&tokens, &clouds)?; // [2 batch, n, width]

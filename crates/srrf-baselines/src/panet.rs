@@ -177,7 +177,13 @@ impl PanetConfig {
         max_over(network.joint.forward(Tensor::cat(levels, 1), clouds), n)
     }
 
-    fn forward(&self, network: &Panet, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Result<Pose, CopyError> {
+    fn forward(
+        &self,
+        network: &Panet,
+        source: Tensor<3>,
+        target: Tensor<3>,
+        phase: f32,
+    ) -> Result<Pose, CopyError> {
         let target = self.encode(network, self.neighbourhoods(target, phase)?);
         let source = self.neighbourhoods(source, phase)?;
         let mut found: Option<(Tensor<3>, Tensor<2>)> = None;

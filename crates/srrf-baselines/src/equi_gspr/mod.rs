@@ -156,7 +156,13 @@ impl EquiGsprConfig {
     }
 
     /// Finds and scores matches.
-    fn forward(&self, network: &EquiGspr, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Result<Scored, CopyError> {
+    fn forward(
+        &self,
+        network: &EquiGspr,
+        source: Tensor<3>,
+        target: Tensor<3>,
+        phase: f32,
+    ) -> Result<Scored, CopyError> {
         let tokens = even_tokens(source.clone(), self.tokens, phase)?;
         let found = matches::putative(&source, &tokens, &target, self.feature_radius)?;
         self.score(network, found)
@@ -241,7 +247,11 @@ impl LearnedConfig for EquiGsprConfig {
 }
 
 /// Which matches the true pose confirms, 1 or 0: `[batch, kept]`.
-fn labels(scored: &Scored, (rotation, translation): (Tensor<3>, Tensor<2>), radius: f64) -> Result<Tensor<2>, CopyError> {
+fn labels(
+    scored: &Scored,
+    (rotation, translation): (Tensor<3>, Tensor<2>),
+    radius: f64,
+) -> Result<Tensor<2>, CopyError> {
     let [batch, kept, _] = scored.source.dims();
     let apart = transform(scored.source.clone(), rotation, translation) - scored.target.clone();
     let apart: Vec<f64> = to_host(&apart.square().sum_dim(2))?;

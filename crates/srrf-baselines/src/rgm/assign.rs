@@ -12,7 +12,10 @@ const LEAST_SUM: f64 = 0.5;
 /// # Shapes
 /// - `assignment`: `[batch, n, m]`, `target_points`: `[batch, m, 3]`
 /// - output: `[batch, n, 3]` and `[batch, n, 1]`
-pub(super) fn one_to_one(assignment: &Tensor<3>, target_points: &Tensor<3>) -> Result<(Tensor<3>, Tensor<3>), CopyError> {
+pub(super) fn one_to_one(
+    assignment: &Tensor<3>,
+    target_points: &Tensor<3>,
+) -> Result<(Tensor<3>, Tensor<3>), CopyError> {
     let [batch, n, m] = assignment.dims();
     let values: Vec<f64> = to_host(assignment)?;
     let (mut chosen, mut weights) = (Vec::with_capacity(batch * n), Vec::with_capacity(batch * n));

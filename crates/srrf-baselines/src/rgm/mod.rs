@@ -147,7 +147,13 @@ impl RgmConfig {
         self.widths.iter().sum::<usize>() + self.width
     }
 
-    fn forward(&self, network: &Rgm, source: Tensor<3>, target: Tensor<3>, phase: f32) -> Result<Matched, CopyError> {
+    fn forward(
+        &self,
+        network: &Rgm,
+        source: Tensor<3>,
+        target: Tensor<3>,
+        phase: f32,
+    ) -> Result<Matched, CopyError> {
         let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
         let tokens = even_tokens(clouds.clone(), self.tokens, phase)?; // [2 batch, n, 3]
         let (edge, node) = network.features.forward(&tokens, &clouds)?;
