@@ -21,7 +21,7 @@ TABLE = re.compile(r"(<!-- t:readme -->\n)(.*?)(<!-- / -->)", re.S)
 ROWS = [  # of README's table: key and words
     ("objects", "objects, clean"),
     ("corrupted", "objects, 12 corruptions"),
-    ("partial", "objects, 70 % of each kept"),
+    ("partial", "objects seen in part"),
     ("scans", "real scans"),
     ("meshes", "other meshes"),
 ]
