@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs the parity suite (crates/srrf-train/tests/backends.rs) and 20 training steps on other backends than
-# flex. See docs/backends.md.
+# flex. See book/src/train/devices.md.
 #
 #   scripts/check-backends.sh [ndarray|wgpu|vulkan|cuda ...]     (default: ndarray wgpu)
 #

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Times a training step and the forward pass of this crate and of the same network in PyTorch, by turns,
-# and prints one table (Markdown). See docs/speed.md.
+# and prints one table (Markdown). See book/src/results/speed.md.
 #
 #   scripts/compare-speed.sh [--rounds 7] [--repeats 5] [--threads 2] [--config configs/modelnet-small.toml]
 #

@@ -7,7 +7,7 @@
 # FOLDER holds all that the machine with the GPU needs beside this checkout: the program `srrf-train`, the
 # training shapes packed below 50 MB (`data/`), and the runs (`runs/CONFIG/`). What is there already is used, so that
 # machine needs neither cargo, Python nor network: the program finds the CUDA driver at run time.
-# Building needs the crates registry, and LibTorch for --device libtorch (docs/backends.md); packing needs python3.
+# Building needs the crates registry, and LibTorch for --device libtorch (book/src/train/devices.md); packing needs python3.
 # For a rehearsal without a GPU: --device flex --config configs/smoke.toml.
 set -euo pipefail
 cd "$(dirname "$0")/.."

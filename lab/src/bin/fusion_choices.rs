@@ -1,6 +1,6 @@
 //! Scores rules to choose between the poses of the two branches, on validation pairs: thresholds of the inlier test,
 //! the weight of the skeleton's ratio, and how many standard errors it must be ahead. The test split plays no part.
-//! The tables of docs/experiments.md come from
+//! The tables of book/src/experiments come from
 //!
 //! ```sh
 //! cargo run -p srrf-lab --bin fusion_choices -- configs/modelnet-gpu-3-end.toml srrf DATA --seeds 6,7,8

@@ -1,5 +1,5 @@
 //! Scores the ways to use trained weights on the validation part of the training set: passes,
-//! tokens, inlier test. The test split plays no part. The tables of docs/experiments.md come from
+//! tokens, inlier test. The test split plays no part. The tables of book/src/experiments come from
 //!
 //! ```sh
 //! cargo run -p srrf-lab --bin inference_choices -- configs/modelnet-gpu-2.toml srrf DATA --rows prior
