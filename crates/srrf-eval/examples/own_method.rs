@@ -9,8 +9,8 @@ use std::io::{self, Write};
 use srrf_cloud::{Register, RegisterError, Registration, Rigid, Solid};
 use srrf_corrupt::{CorruptionKind, Severity};
 use srrf_eval::{
-    DefaultRows, EvalError, Method, MethodContext, MethodSet, Protocol, Run, Summary, SynthesizedPairs, data,
-    report,
+    DefaultRows, EvalError, MethodContext, MethodSet, Protocol, ReadyMethod, Run, Summary, SynthesizedPairs,
+    data, report,
 };
 
 /// Lays the centroid of the source onto that of the target.
@@ -39,8 +39,8 @@ pub fn score() -> Result<Summary, EvalError> {
         },
     )?;
     let known = ["icp", "oracle"].map(str::to_owned);
-    let methods =
-        MethodSet::new(&known, DefaultRows::Plain, &MethodContext::default())?.with(Method::new(Centroids));
+    let methods = MethodSet::new(&known, DefaultRows::Plain, &MethodContext::default())?
+        .with(ReadyMethod::new(Centroids));
     let outcome = Run::new(&pairs, &methods).execute(&mut |_, _| {})?;
     Summary::of(&outcome)
 }

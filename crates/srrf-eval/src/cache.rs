@@ -16,8 +16,8 @@ use sha2::{Digest, Sha256};
 use srrf_corrupt::Pair;
 
 use crate::EvalError;
-use crate::found::Found;
-use crate::methods::Method;
+use crate::kept::KeptAnswer;
+use crate::methods::ReadyMethod;
 
 /// Changes with the meaning of keys and lines.
 const FORMAT: &str = "srrf-eval answers 1";
@@ -36,11 +36,11 @@ pub struct Cache {
     path: PathBuf,
     /// What all keys have in common.
     common: Sha256,
-    lines: Mutex<Lines>,
+    lines: Mutex<KeptLines>,
 }
 
 #[derive(Debug)]
-struct Lines {
+struct KeptLines {
     file: File,
     /// Start and length of the JSON of each key.
     index: HashMap<Key, (u64, usize)>,
@@ -84,7 +84,7 @@ impl Cache {
     }
 
     /// The answer of `method`, if it was computed before.
-    pub(crate) fn get(&self, method: &Method, pair: &PairHash) -> Option<Found> {
+    pub(crate) fn get(&self, method: &ReadyMethod, pair: &PairHash) -> Option<KeptAnswer> {
         let key = self.key(method, pair);
         let mut lines = self.lock();
         let &(start, length) = lines.index.get(&key)?;
@@ -100,7 +100,12 @@ impl Cache {
     ///
     /// # Errors
     /// [`EvalError::Cache`] where it cannot be written.
-    pub(crate) fn put(&self, method: &Method, pair: &PairHash, found: &Found) -> Result<(), EvalError> {
+    pub(crate) fn put(
+        &self,
+        method: &ReadyMethod,
+        pair: &PairHash,
+        found: &KeptAnswer,
+    ) -> Result<(), EvalError> {
         let key = self.key(method, pair);
         let written = serde_json::to_string(found).map_err(io::Error::from).and_then(|json| {
             let line = format!("{} {json}\n", hex(&key));
@@ -114,7 +119,7 @@ impl Cache {
         written.map_err(|source| EvalError::Cache { path: self.path.clone(), source })
     }
 
-    fn key(&self, method: &Method, pair: &PairHash) -> Key {
+    fn key(&self, method: &ReadyMethod, pair: &PairHash) -> Key {
         let hash = self
             .common
             .clone()
@@ -126,7 +131,7 @@ impl Cache {
         std::array::from_fn(|i| hash[i])
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, Lines> {
+    fn lock(&self) -> std::sync::MutexGuard<'_, KeptLines> {
         // A thread that panicked left whole lines behind: each is written by one call.
         self.lines.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -137,7 +142,7 @@ fn part(bytes: &[u8]) -> Vec<u8> {
     [&(bytes.len() as u64).to_le_bytes(), bytes].concat()
 }
 
-fn open(folder: &Path, path: &Path) -> io::Result<Lines> {
+fn open(folder: &Path, path: &Path) -> io::Result<KeptLines> {
     fs::create_dir_all(folder)?;
     let mut file = OpenOptions::new().read(true).append(true).create(true).open(path)?;
     let (mut index, mut start, mut line) = (HashMap::new(), 0u64, Vec::new());
@@ -164,7 +169,7 @@ fn open(folder: &Path, path: &Path) -> io::Result<Lines> {
             file.write_all(b"\n")?;
         }
     }
-    Ok(Lines { file, index, reused: 0 })
+    Ok(KeptLines { file, index, reused: 0 })
 }
 
 fn hex(key: &Key) -> String {
@@ -187,8 +192,8 @@ mod tests {
 
     use super::*;
 
-    fn method(settings: &str) -> Method {
-        Method { settings: settings.into(), ..Method::new(Identity) }
+    fn method(settings: &str) -> ReadyMethod {
+        ReadyMethod { settings: settings.into(), ..ReadyMethod::new(Identity) }
     }
 
     fn pair(item: u64) -> Pair {
@@ -201,8 +206,8 @@ mod tests {
             .unwrap()
     }
 
-    fn found(seconds: f64) -> Found {
-        Found::new(Ok(Registration::from_pose(Rigid::identity())), &Rigid::identity(), seconds)
+    fn found(seconds: f64) -> KeptAnswer {
+        KeptAnswer::new(Ok(Registration::from_pose(Rigid::identity())), &Rigid::identity(), seconds)
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub struct CertaintyScores {
     /// The bins of the calibration error.
     pub bins: [CertaintyBin; BINS],
     #[serde(skip)]
-    sums: Sums,
+    sums: CertaintySums,
 }
 
 /// The pairs whose probability is in one bin.
@@ -57,7 +57,7 @@ pub struct CertaintyBin {
 
 /// What can be added up over groups.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Sums {
+struct CertaintySums {
     squares: f64,
     answered: usize,
     answered_right: usize,
@@ -67,7 +67,7 @@ struct Sums {
 impl CertaintyScores {
     /// Scores of some pairs; `None` without pairs. A probability that is not finite counts as 0, and is not answered.
     pub fn of(claims: &[Claim]) -> Option<Self> {
-        let mut sums = Sums::default();
+        let mut sums = CertaintySums::default();
         for claim in claims {
             let known = claim.probability.is_finite();
             let probability = if known { claim.probability.clamp(0.0, 1.0) } else { 0.0 };
@@ -87,7 +87,7 @@ impl CertaintyScores {
 
     /// Scores of all pairs of several groups together; `None` without pairs.
     pub fn together<'a>(groups: impl IntoIterator<Item = &'a Self>) -> Option<Self> {
-        let mut sums = Sums::default();
+        let mut sums = CertaintySums::default();
         for group in groups {
             sums.squares += group.sums.squares;
             sums.answered += group.sums.answered;
@@ -101,7 +101,7 @@ impl CertaintyScores {
         Self::from_sums(sums)
     }
 
-    fn from_sums(sums: Sums) -> Option<Self> {
+    fn from_sums(sums: CertaintySums) -> Option<Self> {
         let pairs: usize = sums.bins.iter().map(|bin| bin.pairs).sum();
         if pairs == 0 {
             return None;

@@ -32,14 +32,14 @@ pub enum EvalError {
     #[error(transparent)]
     Copy(#[from] srrf_model::CopyError),
     /// A pair cannot be made.
-    #[error("pair {item} of {group}: {problem}")]
+    #[error("pair {item} of {group}: {source}")]
     Pair {
         /// Name of the group.
         group: String,
         /// Number of the pair in it.
         item: usize,
         /// What went wrong.
-        problem: String,
+        source: PairFault,
     },
     /// A name that is no corruption.
     #[error("{0}; or `clean`")]
@@ -145,6 +145,23 @@ impl From<EvalError> for srrf_args::Failure {
     fn from(error: EvalError) -> Self {
         if error.is_usage() { Self::input(error) } else { Self::other(error) }
     }
+}
+
+/// Why a pair cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum PairFault {
+    /// The shape cannot be had, corrupted or posed.
+    #[error(transparent)]
+    Synthesis(#[from] srrf_corrupt::PairError),
+    /// The points that were chosen make no cloud.
+    #[error(transparent)]
+    Cloud(#[from] srrf_cloud::CloudError),
+    /// The method whose skeletons are the points cannot register the whole pair.
+    #[error(transparent)]
+    Skeletons(#[from] srrf_cloud::RegisterError),
+    /// The method makes no skeletons.
+    #[error("the method makes no skeletons")]
+    NoSkeletons,
 }
 
 impl EvalError {

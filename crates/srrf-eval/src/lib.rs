@@ -5,7 +5,7 @@
 //! 1. pairs come from shapes ([`SynthesizedPairs`]) or from a file ([`PairFile`]); both are a
 //!    [`PairSource`];
 //! 2. [`Run`] gives them to the methods of a [`MethodSet`], chosen from the [`registry`], and keeps every answer;
-//! 3. every answer becomes a [`PairError`], and many become [`Scores`];
+//! 3. every answer becomes a [`PoseError`], and many become [`Scores`];
 //! 4. [`Summary`] has them per corruption, severity and method;
 //! 5. [`report`] writes tables, curves and `results.json`; [`tables`] runs many experiments and makes the
 //!    whole report of the paper's tables and figures.
@@ -13,13 +13,14 @@
 //! A method of your own goes the same way: [`MethodSet::with`], see `examples/own_method.rs`. A new learned baseline is one file
 //! and one line in `srrf-baselines`, a new classical method one line in the [`registry`].
 
+mod answers;
 mod cache;
 mod certainty;
 mod chamfer;
 mod cli;
 pub mod data;
 mod error;
-mod found;
+mod kept;
 mod method_set;
 mod methods;
 mod metrics;
@@ -34,23 +35,26 @@ mod summary;
 pub mod tables;
 mod transforms;
 
+pub use answers::{Answer, PairRecord, RunOutcome};
 pub use cache::Cache;
 pub use certainty::{CertaintyBin, CertaintyScores, Claim};
 pub use chamfer::{CleanShape, SkeletonAgreement};
-pub use cli::{Command, Options, command};
-pub use error::EvalError;
+pub use cli::{EvalCommand, EvalOptions, command};
+pub use error::{EvalError, PairFault};
 pub use method_set::{DefaultRows, MethodSet};
-pub use methods::{Method, MethodContext, MethodEntry, MethodFamily, SetupError, Shown, all_rows, registry};
+pub use methods::{
+    MethodContext, MethodEntry, MethodFamily, ReadyMethod, SetupError, Shown, all_rows, registry,
+};
 pub use metrics::{
-    MetricError, PairError, RECALL_ROTATION_DEG, RECALL_TRANSLATION, RIGHT_RADIUS_SHARE, RIGHT_ROTATION_DEG,
+    MetricError, PoseError, RECALL_ROTATION_DEG, RECALL_TRANSLATION, RIGHT_RADIUS_SHARE, RIGHT_ROTATION_DEG,
     Scores, is_right,
 };
 pub use pair_file::{PairFile, export};
 pub use pairs::{EvalPair, Group, PairSource};
 pub use protocol::{CLEAN, Protocol, SynthesizedPairs};
 pub use report::Meta;
-pub use rows::{Row, RowSource};
-pub use run::{Answer, Outcome, PairRecord, Run};
+pub use rows::{RowSource, TableRow};
+pub use run::Run;
 pub use summary::{SeverityKey, Summary, SummaryRow};
 pub use tables::TablesOptions;
 pub use transforms::Transforms;

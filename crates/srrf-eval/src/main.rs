@@ -7,19 +7,19 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use indicatif::{ProgressBar, ProgressStyle};
 use srrf_args::{interrupt, run_program};
 use srrf_cloud::profile;
-use srrf_eval::tables::{self, Progress};
+use srrf_eval::tables::{self, TablesProgress};
 use srrf_eval::{
-    Command, DefaultRows, EvalError, Meta, MethodContext, MethodSet, Options, PairFile, PairSource, Run,
-    Summary, SynthesizedPairs, TablesOptions, Transforms, data, report,
+    DefaultRows, EvalCommand, EvalError, EvalOptions, Meta, MethodContext, MethodSet, PairFile, PairSource,
+    Run, Summary, SynthesizedPairs, TablesOptions, Transforms, data, report,
 };
 
 fn main() -> ExitCode {
     srrf_model::keep_freed_memory();
-    run_program(|options: Options| {
+    run_program(|options: EvalOptions| {
         interrupt::install()?;
         match &options.command {
-            Some(Command::Scripts(scripts)) => return scripts.run(srrf_eval::command()),
-            Some(Command::Tables(tables)) => {
+            Some(EvalCommand::Scripts(scripts)) => return scripts.run(srrf_eval::command()),
+            Some(EvalCommand::Tables(tables)) => {
                 interrupt::advise("; the same command goes on where this one stopped");
                 make_tables(tables)?;
             }
@@ -29,7 +29,7 @@ fn main() -> ExitCode {
     })
 }
 
-fn run(options: &Options) -> Result<(), EvalError> {
+fn run(options: &EvalOptions) -> Result<(), EvalError> {
     let (start, threads) = (Instant::now(), options.thread_count());
     if options.profile {
         profile::start();
@@ -126,14 +126,14 @@ fn run(options: &Options) -> Result<(), EvalError> {
 fn make_tables(options: &TablesOptions) -> Result<(), EvalError> {
     let bar = ProgressBar::new(0).with_style(bar_style());
     let written = tables::make(options, &mut |progress| match progress {
-        Progress::Line(line) => say(line),
-        Progress::Start(title, pairs) => {
+        TablesProgress::Line(line) => say(line),
+        TablesProgress::Start(title, pairs) => {
             bar.finish_and_clear();
             say(&format!("{title}: {pairs} pairs"));
             bar.reset();
             bar.set_length(pairs as u64);
         }
-        Progress::Done(pairs, group) => {
+        TablesProgress::Done(pairs, group) => {
             bar.inc(pairs as u64);
             bar.set_message(group.to_owned());
         }
@@ -144,7 +144,7 @@ fn make_tables(options: &TablesOptions) -> Result<(), EvalError> {
 }
 
 /// The pairs of a file, or pairs made from shapes.
-fn open_pairs(options: &Options) -> Result<Box<dyn PairSource>, EvalError> {
+fn open_pairs(options: &EvalOptions) -> Result<Box<dyn PairSource>, EvalError> {
     if let Some(path) = &options.pairs {
         return Ok(Box::new(PairFile::read(path)?));
     }

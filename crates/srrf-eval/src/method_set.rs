@@ -3,17 +3,17 @@
 use std::collections::BTreeMap;
 
 use crate::EvalError;
-use crate::methods::{Method, MethodContext, SetupError, Shown, all_rows, entry_of, registry};
-use crate::rows::{Row, RowSource};
+use crate::methods::{MethodContext, ReadyMethod, SetupError, Shown, all_rows, entry_of, registry};
+use crate::rows::{RowSource, TableRow};
 use crate::transforms::Transforms;
 
 /// Methods that are ready to run, and the rows of the tables.
 #[derive(Default)]
 pub struct MethodSet {
     /// The methods.
-    pub methods: Vec<Method>,
+    pub methods: Vec<ReadyMethod>,
     /// Rows, in the order of the tables.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
     /// Rows that are left out, and why.
     pub left_out: Vec<(String, String)>,
 }
@@ -28,7 +28,7 @@ pub enum DefaultRows {
 }
 
 impl DefaultRows {
-    fn has(self, row: &Row) -> bool {
+    fn has(self, row: &TableRow) -> bool {
         let shown = entry_of(row).map_or(Shown::Everywhere, |entry| entry.shown);
         match self {
             Self::Plain => shown == Shown::Everywhere,
@@ -46,12 +46,12 @@ impl MethodSet {
     pub fn new(names: &[String], defaults: DefaultRows, context: &MethodContext) -> Result<Self, EvalError> {
         let known = all_rows();
         let named = |name: &String| known.iter().find(|row| row.to_string() == *name).cloned();
-        let wanted: Vec<Row> = if names.is_empty() {
+        let wanted: Vec<TableRow> = if names.is_empty() {
             known.iter().filter(|row| defaults.has(row)).cloned().collect()
         } else {
             let unknown = |name: &String| EvalError::Method {
                 name: name.clone(),
-                known: known.iter().map(Row::to_string).collect::<Vec<_>>().join(", "),
+                known: known.iter().map(TableRow::to_string).collect::<Vec<_>>().join(", "),
             };
             names.iter().map(|name| named(name).ok_or_else(|| unknown(name))).collect::<Result<_, _>>()?
         };
@@ -63,7 +63,7 @@ impl MethodSet {
     /// # Errors
     /// [`EvalError::Setup`] for a method that cannot be set up.
     pub(crate) fn of_rows(
-        wanted: &[Row],
+        wanted: &[TableRow],
         may_leave_out: bool,
         context: &MethodContext,
     ) -> Result<Self, EvalError> {
@@ -77,14 +77,14 @@ impl MethodSet {
                 Err(source) => return Err(EvalError::Setup { name: entry.name, source }),
             }
         }
-        let filled = |row: &Row| *row == Row::Oracle || set.method(row).is_some();
+        let filled = |row: &TableRow| *row == TableRow::Oracle || set.method(row).is_some();
         set.rows = all_rows().into_iter().filter(|row| wanted.contains(row) && filled(row)).collect();
         Ok(set)
     }
 
     /// Adds a method of your own, with a row for it (and its branches) after the others.
     #[must_use]
-    pub fn with(mut self, method: Method) -> Self {
+    pub fn with(mut self, method: ReadyMethod) -> Self {
         self.rows.extend(method.rows());
         self.methods.push(method);
         self
@@ -93,7 +93,8 @@ impl MethodSet {
     /// Without the methods of which nothing is wanted but what another one answers on its way.
     #[must_use]
     pub fn without_held(mut self) -> Self {
-        let held: Vec<Row> = self.methods.iter().flat_map(|m| m.holds).map(|(row, _)| row.clone()).collect();
+        let held: Vec<TableRow> =
+            self.methods.iter().flat_map(|m| m.holds).map(|(row, _)| row.clone()).collect();
         self.methods.retain(|method| !method.rows().iter().all(|row| held.contains(row)));
         self
     }
@@ -111,7 +112,7 @@ impl MethodSet {
                     file.name
                 )));
             }
-            self.rows.push(Row::File(file.name.clone()));
+            self.rows.push(TableRow::File(file.name.clone()));
         }
         Ok(())
     }
@@ -121,40 +122,44 @@ impl MethodSet {
     /// # Errors
     /// [`EvalError::Usage`] where it was `asked` for by name.
     pub fn drop_oracle(&mut self, asked: bool) -> Result<(), EvalError> {
-        if asked && self.rows.contains(&Row::Oracle) {
+        if asked && self.rows.contains(&TableRow::Oracle) {
             return Err(EvalError::Usage(
                 "--methods oracle: these pairs keep no correspondences; use --sampling shared, or pairs \
                  exported by this program"
                     .into(),
             ));
         }
-        self.rows.retain(|row| *row != Row::Oracle);
+        self.rows.retain(|row| *row != TableRow::Oracle);
         Ok(())
     }
 
     /// The rows among `wanted`, in the order of the tables.
-    pub(crate) fn only(&self, wanted: &[Row]) -> Vec<Row> {
+    pub(crate) fn only(&self, wanted: &[TableRow]) -> Vec<TableRow> {
         self.rows.iter().filter(|row| wanted.contains(row)).cloned().collect()
     }
 
     /// The method that fills a row.
-    pub fn method(&self, row: &Row) -> Option<&Method> {
+    pub fn method(&self, row: &TableRow) -> Option<&ReadyMethod> {
         self.methods.iter().find(|method| method.rows().contains(row))
     }
 
     /// Where the weights of each method that learns come from, by its name.
     pub fn weights(&self) -> BTreeMap<String, String> {
-        let named = |m: &Method| Some((m.register.name().to_owned(), m.weights.clone()?));
+        let named = |m: &ReadyMethod| Some((m.register.name().to_owned(), m.weights.clone()?));
         self.methods.iter().filter_map(named).collect()
     }
 }
 
 /// What fills a row; `None` where nothing does. A method's own row before one that another method answers on its way.
-pub(crate) fn source_of(row: &Row, methods: &[Method], transforms: &[Transforms]) -> Option<RowSource> {
+pub(crate) fn source_of(
+    row: &TableRow,
+    methods: &[ReadyMethod],
+    transforms: &[Transforms],
+) -> Option<RowSource> {
     match row {
-        Row::Oracle => return Some(RowSource::Oracle),
-        Row::File(name) => return transforms.iter().position(|t| t.name == *name).map(RowSource::File),
-        Row::Method(_) | Row::Branch(..) => {}
+        TableRow::Oracle => return Some(RowSource::Oracle),
+        TableRow::File(name) => return transforms.iter().position(|t| t.name == *name).map(RowSource::File),
+        TableRow::Method(_) | TableRow::Branch(..) => {}
     }
     let own = || {
         methods.iter().enumerate().find_map(|(method, m)| {
@@ -183,7 +188,7 @@ mod tests {
     #[test]
     fn rows_are_chosen_by_name_and_kept_in_order() {
         let chosen = set(&["oracle", "identity"], DefaultRows::Plain).unwrap();
-        assert_eq!(chosen.rows, [Row::IDENTITY, Row::Oracle]);
+        assert_eq!(chosen.rows, [TableRow::IDENTITY, TableRow::Oracle]);
         assert_eq!(chosen.methods.len(), 1);
         let error = set(&["icp", "magic"], DefaultRows::Plain).err().unwrap().to_string();
         assert!(error.contains("`magic`") && error.contains("identity, icp"), "{error}");
@@ -192,11 +197,11 @@ mod tests {
     #[test]
     fn default_rows() {
         let plain = set(&[], DefaultRows::Plain).unwrap();
-        assert_eq!(plain.rows[..3], [Row::IDENTITY, Row::ICP, Row::Oracle]);
+        assert_eq!(plain.rows[..3], [TableRow::IDENTITY, TableRow::ICP, TableRow::Oracle]);
         let tables = set(&[], DefaultRows::Tables).unwrap();
         assert!(plain.rows.iter().all(|row| tables.rows.contains(row)));
-        assert!(tables.rows.contains(&Row::RGM) && tables.rows.contains(&Row::SRRF_REFINE));
-        assert!(!tables.rows.contains(&Row::method("icp-centred")));
+        assert!(tables.rows.contains(&TableRow::RGM) && tables.rows.contains(&TableRow::SRRF_REFINE));
+        assert!(!tables.rows.contains(&TableRow::method("icp-centred")));
         assert!(tables.left_out.is_empty(), "every learned baseline is trained");
         assert!(tables.weights()["srrf"].starts_with("srrf "));
     }
@@ -214,15 +219,15 @@ mod tests {
     #[test]
     fn sources_are_the_methods_own_answers_first() {
         let both = set(&["srrf", "srrf-dense", "srrf+refine", "icp"], DefaultRows::Plain).unwrap();
-        let source = |row: &Row| source_of(row, &both.methods, &[]);
+        let source = |row: &TableRow| source_of(row, &both.methods, &[]);
         let answer = |method, branch, own| Some(RowSource::Answer { method, branch, own });
-        assert_eq!(source(&Row::SRRF), answer(1, None, true));
-        assert_eq!(source(&Row::SRRF_DENSE), answer(1, Some("dense"), true));
+        assert_eq!(source(&TableRow::SRRF), answer(1, None, true));
+        assert_eq!(source(&TableRow::SRRF_DENSE), answer(1, Some("dense"), true));
         let refined = both.without_held();
-        let source = |row: &Row| source_of(row, &refined.methods, &[]);
-        assert_eq!(source(&Row::SRRF), answer(1, Some("unrefined"), false));
-        assert_eq!(source(&Row::SRRF_REFINE), answer(1, None, true));
-        assert_eq!(source(&Row::Oracle), Some(RowSource::Oracle));
-        assert_eq!((source(&Row::DCP), source(&Row::File("tool".into()))), (None, None));
+        let source = |row: &TableRow| source_of(row, &refined.methods, &[]);
+        assert_eq!(source(&TableRow::SRRF), answer(1, Some("unrefined"), false));
+        assert_eq!(source(&TableRow::SRRF_REFINE), answer(1, None, true));
+        assert_eq!(source(&TableRow::Oracle), Some(RowSource::Oracle));
+        assert_eq!((source(&TableRow::DCP), source(&TableRow::File("tool".into()))), (None, None));
     }
 }

@@ -13,7 +13,7 @@ use srrf_model::weights::{self, LoadedModel, WeightsError};
 use srrf_model::{BranchKind, DeviceError, NetworkConfig, SrrfRegister, embedded};
 use srrf_refine::{RefineConfig, Refined};
 
-use crate::rows::Row;
+use crate::rows::TableRow;
 
 /// What the entries of the registry may need to set up a method.
 #[derive(Debug, Clone)]
@@ -84,14 +84,14 @@ pub enum SetupError {
 }
 
 /// A method ready to run.
-pub struct Method {
+pub struct ReadyMethod {
     /// The method.
     pub register: Box<dyn Register>,
     /// Its branches that have a row each, before the method's own.
     pub branches: &'static [&'static str],
     /// Rows of another method that this one answers on its way, each with the branch that holds it: where
     /// they are all that is wanted of the other, it need not run.
-    pub holds: &'static [(Row, &'static str)],
+    pub holds: &'static [(TableRow, &'static str)],
     /// Where its weights come from; `None` for methods that learn nothing.
     pub weights: Option<String>,
     /// Settings that are not the method's defaults, in words; empty for the defaults. With name and
@@ -101,7 +101,7 @@ pub struct Method {
     pub(crate) stage: &'static str,
 }
 
-impl Method {
+impl ReadyMethod {
     /// A method without weights and with its default settings.
     pub fn new(register: impl Register + 'static) -> Self {
         Self {
@@ -115,10 +115,10 @@ impl Method {
     }
 
     /// The rows that it fills: its branches, then itself.
-    pub fn rows(&self) -> Vec<Row> {
+    pub fn rows(&self) -> Vec<TableRow> {
         let name = || self.register.name().to_owned();
-        let branches = self.branches.iter().map(|branch| Row::Branch(name().into(), (*branch).into()));
-        branches.chain([Row::Method(name().into())]).collect()
+        let branches = self.branches.iter().map(|branch| TableRow::Branch(name().into(), (*branch).into()));
+        branches.chain([TableRow::Method(name().into())]).collect()
     }
 
     fn with_weights(self, weights: String) -> Self {
@@ -148,7 +148,7 @@ pub struct MethodEntry {
     pub family: MethodFamily,
     /// Where it runs when `--methods` is not given.
     pub shown: Shown,
-    build: fn(&MethodContext, &'static str) -> Result<Method, SetupError>,
+    build: fn(&MethodContext, &'static str) -> Result<ReadyMethod, SetupError>,
 }
 
 /// Where a method runs that nobody asked for by name.
@@ -168,7 +168,7 @@ impl MethodEntry {
         name: &'static str,
         family: MethodFamily,
         shown: Shown,
-        build: fn(&MethodContext, &'static str) -> Result<Method, SetupError>,
+        build: fn(&MethodContext, &'static str) -> Result<ReadyMethod, SetupError>,
     ) -> Self {
         Self { name, branches: &[], family, shown, build }
     }
@@ -177,15 +177,15 @@ impl MethodEntry {
     ///
     /// # Errors
     /// [`SetupError`]
-    pub fn set_up(&self, context: &MethodContext) -> Result<Method, SetupError> {
+    pub fn set_up(&self, context: &MethodContext) -> Result<ReadyMethod, SetupError> {
         let method = (self.build)(context, self.name)?;
-        Ok(Method { branches: self.branches, stage: self.name, ..method })
+        Ok(ReadyMethod { branches: self.branches, stage: self.name, ..method })
     }
 
     /// The rows that it fills: its branches, then itself.
-    pub fn rows(&self) -> Vec<Row> {
-        let branches = self.branches.iter().map(|branch| Row::branch(self.name, branch));
-        branches.chain([Row::method(self.name)]).collect()
+    pub fn rows(&self) -> Vec<TableRow> {
+        let branches = self.branches.iter().map(|branch| TableRow::branch(self.name, branch));
+        branches.chain([TableRow::method(self.name)]).collect()
     }
 }
 
@@ -194,16 +194,16 @@ use Shown::{Everywhere, InTables, OnRequest};
 
 /// Methods that learn nothing, in the order of the tables.
 const CLASSICAL: &[MethodEntry] = &[
-    MethodEntry::new("identity", Classical, Everywhere, |_, _| Ok(Method::new(Identity))),
-    MethodEntry::new("icp", Classical, Everywhere, |_, _| Ok(Method::new(Icp::default()))),
+    MethodEntry::new("identity", Classical, Everywhere, |_, _| Ok(ReadyMethod::new(Identity))),
+    MethodEntry::new("icp", Classical, Everywhere, |_, _| Ok(ReadyMethod::new(Icp::default()))),
     MethodEntry::new("icp-centred", Classical, OnRequest, |_, _| {
-        Ok(Method::new(Icp::new(IcpConfig { centred: true, ..IcpConfig::default() })))
+        Ok(ReadyMethod::new(Icp::new(IcpConfig { centred: true, ..IcpConfig::default() })))
     }),
-    MethodEntry::new("icp-plane", Classical, OnRequest, |_, _| Ok(Method::new(IcpPlane::default()))),
-    MethodEntry::new("icp-trimmed", Classical, OnRequest, |_, _| Ok(Method::new(IcpTrimmed::default()))),
-    MethodEntry::new("icp-robust", Classical, OnRequest, |_, _| Ok(Method::new(IcpRobust::default()))),
-    MethodEntry::new("fpfh-ransac", Classical, InTables, |_, _| Ok(Method::new(FpfhRansac::default()))),
-    MethodEntry::new("fgr", Classical, OnRequest, |_, _| Ok(Method::new(Fgr::default()))),
+    MethodEntry::new("icp-plane", Classical, OnRequest, |_, _| Ok(ReadyMethod::new(IcpPlane::default()))),
+    MethodEntry::new("icp-trimmed", Classical, OnRequest, |_, _| Ok(ReadyMethod::new(IcpTrimmed::default()))),
+    MethodEntry::new("icp-robust", Classical, OnRequest, |_, _| Ok(ReadyMethod::new(IcpRobust::default()))),
+    MethodEntry::new("fpfh-ransac", Classical, InTables, |_, _| Ok(ReadyMethod::new(FpfhRansac::default()))),
+    MethodEntry::new("fgr", Classical, OnRequest, |_, _| Ok(ReadyMethod::new(Fgr::default()))),
 ];
 
 /// The network of the paper, and what is built on it, in the order of the tables.
@@ -212,7 +212,7 @@ const SRRF: &[MethodEntry] = &[
         branches: &["dense", "skeleton"],
         ..MethodEntry::new("srrf", Srrf, Everywhere, |context, _| {
             let (register, weights) = srrf(context)?;
-            Ok(Method::new(register).with_weights(weights))
+            Ok(ReadyMethod::new(register).with_weights(weights))
         })
     },
     MethodEntry::new("srrf-dense-alone", Srrf, OnRequest, |context, _| alone(context, BranchKind::Dense)),
@@ -221,8 +221,8 @@ const SRRF: &[MethodEntry] = &[
     }),
     MethodEntry::new("srrf+refine", Srrf, InTables, |context, _| {
         let (register, weights) = srrf(context)?;
-        let refined = Method::new(Refined::new(register, RefineConfig::default()));
-        Ok(Method { holds: UNREFINED, ..refined }.with_weights(weights))
+        let refined = ReadyMethod::new(Refined::new(register, RefineConfig::default()));
+        Ok(ReadyMethod { holds: UNREFINED, ..refined }.with_weights(weights))
     }),
     MethodEntry::new("srrf-register", Srrf, Everywhere, |context, _| product(context, RotationRange::Any)),
     MethodEntry::new("srrf-register-45", Srrf, Everywhere, |context, _| {
@@ -231,10 +231,10 @@ const SRRF: &[MethodEntry] = &[
 ];
 
 /// Rows of `srrf` that `srrf+refine` answers.
-const UNREFINED: &[(Row, &str)] =
-    &[(Row::SRRF_DENSE, "dense"), (Row::SRRF_SKELETON, "skeleton"), (Row::SRRF, "unrefined")];
+const UNREFINED: &[(TableRow, &str)] =
+    &[(TableRow::SRRF_DENSE, "dense"), (TableRow::SRRF_SKELETON, "skeleton"), (TableRow::SRRF, "unrefined")];
 
-/// All methods, in the order of the tables. [`Row::Oracle`] is not among them: it is no `Register`, since it needs to
+/// All methods, in the order of the tables. [`TableRow::Oracle`] is not among them: it is no `Register`, since it needs to
 /// know the correspondences.
 pub fn registry() -> &'static [MethodEntry] {
     static ALL: OnceLock<Vec<MethodEntry>> = OnceLock::new();
@@ -250,21 +250,21 @@ pub fn registry() -> &'static [MethodEntry] {
 }
 
 /// All rows, in the order of the tables: the oracle stands after the classical and learned methods, before ours.
-pub fn all_rows() -> Vec<Row> {
+pub fn all_rows() -> Vec<TableRow> {
     let of = |ours: bool| {
         registry().iter().filter(move |entry| (entry.family == Srrf) == ours).flat_map(MethodEntry::rows)
     };
-    of(false).chain([Row::Oracle]).chain(of(true)).collect()
+    of(false).chain([TableRow::Oracle]).chain(of(true)).collect()
 }
 
 /// The entry whose method fills a row; `None` for the oracle, files and methods that are not in the registry.
-pub(crate) fn entry_of(row: &Row) -> Option<&'static MethodEntry> {
-    let (Row::Method(name) | Row::Branch(name, _)) = row else { return None };
+pub(crate) fn entry_of(row: &TableRow) -> Option<&'static MethodEntry> {
+    let (TableRow::Method(name) | TableRow::Branch(name, _)) = row else { return None };
     registry().iter().find(|entry| entry.name == name)
 }
 
 /// Whether a row is the network's, or of what is built on it.
-pub(crate) fn is_ours(row: &Row) -> bool {
+pub(crate) fn is_ours(row: &TableRow) -> bool {
     entry_of(row).is_some_and(|entry| entry.family == Srrf)
 }
 
@@ -272,7 +272,7 @@ pub(crate) fn is_ours(row: &Row) -> bool {
 struct SetUp<'a>(&'a MethodContext);
 
 impl BaselineVisitor for SetUp<'_> {
-    type Output = Result<Method, SetupError>;
+    type Output = Result<ReadyMethod, SetupError>;
 
     fn visit<C: LearnedConfig + 'static>(self) -> Self::Output {
         let (context, name) = (self.0, C::NAME);
@@ -283,7 +283,7 @@ impl BaselineVisitor for SetUp<'_> {
             (None, None) => return Err(SetupError::Untrained { name }),
         };
         let weights = describe(&loaded, &origin);
-        Ok(Method::new(LearnedRegister::new(loaded, device)).with_weights(weights))
+        Ok(ReadyMethod::new(LearnedRegister::new(loaded, device)).with_weights(weights))
     }
 }
 
@@ -303,13 +303,13 @@ fn srrf(context: &MethodContext) -> Result<(SrrfRegister, String), SetupError> {
 }
 
 /// One branch of it in all passes.
-fn alone(context: &MethodContext, branch: BranchKind) -> Result<Method, SetupError> {
+fn alone(context: &MethodContext, branch: BranchKind) -> Result<ReadyMethod, SetupError> {
     let (register, weights) = srrf(context)?;
-    Ok(Method::new(register.alone(branch)).with_weights(weights))
+    Ok(ReadyMethod::new(register.alone(branch)).with_weights(weights))
 }
 
 /// What `srrf register` runs, with its default options but for the range of the rotation.
-fn product(context: &MethodContext, rotation: RotationRange) -> Result<Method, SetupError> {
+fn product(context: &MethodContext, rotation: RotationRange) -> Result<ReadyMethod, SetupError> {
     let (_, weights) = network(context)?;
     let options = srrf::Options {
         rotation,
@@ -318,8 +318,8 @@ fn product(context: &MethodContext, rotation: RotationRange) -> Result<Method, S
         ..srrf::Options::default()
     };
     let settings = options.to_string();
-    let method = Method::new(srrf::Registrar::new(options)?).with_weights(weights);
-    Ok(Method { settings, ..method })
+    let method = ReadyMethod::new(srrf::Registrar::new(options)?).with_weights(weights);
+    Ok(ReadyMethod { settings, ..method })
 }
 
 /// The network of `--weights`, or the one in the program, and where it comes from, in words.
@@ -349,29 +349,36 @@ mod tests {
             let method = entry.set_up(&context).unwrap();
             assert_eq!(method.register.name(), entry.name);
             assert_eq!(method.rows(), entry.rows());
-            assert_eq!(entry_of(&Row::method(entry.name)).unwrap().name, entry.name);
+            assert_eq!(entry_of(&TableRow::method(entry.name)).unwrap().name, entry.name);
         }
     }
 
     #[test]
     fn rows_have_one_name_each_and_the_oracle_its_place() {
         let rows = all_rows();
-        let names: std::collections::BTreeSet<String> = rows.iter().map(Row::to_string).collect();
+        let names: std::collections::BTreeSet<String> = rows.iter().map(TableRow::to_string).collect();
         assert_eq!(names.len(), rows.len());
-        let oracle = rows.iter().position(|row| *row == Row::Oracle).unwrap();
+        let oracle = rows.iter().position(|row| *row == TableRow::Oracle).unwrap();
         assert!(rows[..oracle].iter().all(|row| !is_ours(row)) && rows[oracle + 1..].iter().all(is_ours));
-        let known = [Row::IDENTITY, Row::ICP, Row::FPFH_RANSAC, Row::DCP, Row::RGM, Row::SRRF_REFINE];
-        for known in known.into_iter().chain([Row::SRRF_REGISTER, Row::SRRF_REGISTER_45]) {
+        let known = [
+            TableRow::IDENTITY,
+            TableRow::ICP,
+            TableRow::FPFH_RANSAC,
+            TableRow::DCP,
+            TableRow::RGM,
+            TableRow::SRRF_REFINE,
+        ];
+        for known in known.into_iter().chain([TableRow::SRRF_REGISTER, TableRow::SRRF_REGISTER_45]) {
             assert!(rows.contains(&known), "{known}");
         }
-        assert!(Row::NETWORK.iter().all(|row| rows.contains(row)));
+        assert!(TableRow::NETWORK.iter().all(|row| rows.contains(row)));
     }
 
     #[test]
     fn bad_weights_and_devices_keep_their_cause() {
         let bad =
             MethodContext { weights: [("dcp".to_owned(), "none".into())].into(), device: "flex".into() };
-        let entry = entry_of(&Row::DCP).unwrap();
+        let entry = entry_of(&TableRow::DCP).unwrap();
         assert!(matches!(entry.set_up(&bad), Err(SetupError::Weights(_))));
         let nowhere = MethodContext::of_srrf(None, "abacus");
         assert!(matches!(entry.set_up(&nowhere), Err(SetupError::Device(_))));

@@ -1,4 +1,4 @@
-//! The one scorer: every method, branch and file of transforms goes through [`PairError`] and
+//! The one scorer: every method, branch and file of transforms goes through [`PoseError`] and
 //! [`Scores`].
 //!
 //! - Anisotropic errors follow DCP: the three Euler angles of `R = Rx(a) Ry(b) Rz(c)` of the pose
@@ -51,7 +51,7 @@ pub enum MetricError {
 
 /// Errors of one method on one pair.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PairError {
+pub struct PoseError {
     /// Euler angles, predicted minus true, wrapped into [-180, 180), degrees.
     pub euler_deg: [f64; 3],
     /// `t - t_gt`, per component.
@@ -69,7 +69,7 @@ pub struct PairError {
     pub failed: bool,
 }
 
-impl PairError {
+impl PoseError {
     /// Compares a prediction with the truth; both map source to target. `None` and poses that are
     /// not finite count as failed, scored as the identity.
     pub fn new(predicted: Option<&Rigid>, truth: &Rigid) -> Self {
@@ -143,12 +143,12 @@ pub struct Scores {
 }
 
 impl Scores {
-    /// Sums up the errors of one method.
+    /// CertaintySums up the errors of one method.
     ///
     /// # Errors
     /// [`MetricError::NoPairs`] without errors, [`MetricError::NotFinite`] where a true pose was
     /// not finite, [`MetricError::MaeAboveRmse`] never, unless this function is wrong.
-    pub fn from_errors(errors: &[PairError]) -> Result<Self, MetricError> {
+    pub fn from_errors(errors: &[PoseError]) -> Result<Self, MetricError> {
         if errors.is_empty() {
             return Err(MetricError::NoPairs);
         }
@@ -258,11 +258,11 @@ mod tests {
     #[test]
     fn the_identity_scores_chance_level() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let errors: Vec<PairError> = (0..40_000)
+        let errors: Vec<PoseError> = (0..40_000)
             .map(|_| {
                 let angles = std::array::from_fn(|_| rng.random_range(0.0..45.0));
                 let translation = std::array::from_fn(|_| rng.random_range(-0.5..0.5));
-                PairError::new(Some(&Rigid::identity()), &pose(angles, translation))
+                PoseError::new(Some(&Rigid::identity()), &pose(angles, translation))
             })
             .collect();
         let scores = Scores::from_errors(&errors).unwrap();
@@ -278,8 +278,8 @@ mod tests {
     fn values_by_hand() {
         let truth = pose([10.0, 0.0, 0.0], [0.1, 0.2, 0.3]);
         let errors = [
-            PairError::new(Some(&pose([13.0, 0.0, 0.0], [0.4, 0.2, 0.7])), &truth),
-            PairError::new(Some(&pose([10.0, -4.0, 0.0], [0.1, 0.2, 0.3])), &truth),
+            PoseError::new(Some(&pose([13.0, 0.0, 0.0], [0.4, 0.2, 0.7])), &truth),
+            PoseError::new(Some(&pose([10.0, -4.0, 0.0], [0.1, 0.2, 0.3])), &truth),
         ];
         let s = Scores::from_errors(&errors).unwrap();
         near(s.mse_r, 25.0 / 6.0, 1e-9);
@@ -297,7 +297,7 @@ mod tests {
     #[test]
     fn differences_wrap_around() {
         let error =
-            PairError::new(Some(&pose([-179.0, 0.0, 0.0], [0.0; 3])), &pose([179.0, 0.0, 0.0], [0.0; 3]));
+            PoseError::new(Some(&pose([-179.0, 0.0, 0.0], [0.0; 3])), &pose([179.0, 0.0, 0.0], [0.0; 3]));
         near(error.euler_deg[0], 2.0, 1e-9);
         near(error.rotation_deg, 2.0, 1e-9);
     }
@@ -309,10 +309,10 @@ mod tests {
         broken.rotation[(1, 2)] = f64::NAN;
         let mut far = Rigid::identity();
         far.translation = Vector3::new(0.0, f64::INFINITY, 0.0);
-        let identity = PairError::new(Some(&Rigid::identity()), &truth);
+        let identity = PoseError::new(Some(&Rigid::identity()), &truth);
         for answer in [None, Some(&broken), Some(&far)] {
-            let failed = PairError::new(answer, &truth);
-            assert_eq!(failed, PairError { failed: true, ..identity });
+            let failed = PoseError::new(answer, &truth);
+            assert_eq!(failed, PoseError { failed: true, ..identity });
             // The identity would be recalled here; a failure is not.
             assert!(identity.recalled() && !failed.recalled());
             assert_eq!(Scores::from_errors(&[identity, failed]).unwrap().failed, 1);
@@ -323,10 +323,10 @@ mod tests {
     fn mae_never_exceeds_rmse() {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
         for n in [1, 2, 7, 30] {
-            let errors: Vec<PairError> = (0..n)
+            let errors: Vec<PoseError> = (0..n)
                 .map(|_| {
                     let mut draw = |scale: f64| std::array::from_fn(|_| rng.random_range(-scale..scale));
-                    PairError::new(Some(&pose(draw(180.0), draw(2.0))), &pose(draw(45.0), draw(0.5)))
+                    PoseError::new(Some(&pose(draw(180.0), draw(2.0))), &pose(draw(45.0), draw(0.5)))
                 })
                 .collect();
             let s = Scores::from_errors(&errors).unwrap();
@@ -341,7 +341,7 @@ mod tests {
     fn mean_over_severities_is_the_mean_of_the_values() {
         let truth = pose([0.0; 3], [0.0; 3]);
         let at = |deg: f64| {
-            Scores::from_errors(&[PairError::new(Some(&pose([deg, 0.0, 0.0], [0.0; 3])), &truth)]).unwrap()
+            Scores::from_errors(&[PoseError::new(Some(&pose([deg, 0.0, 0.0], [0.0; 3])), &truth)]).unwrap()
         };
         let mean = Scores::mean(&[at(1.0), at(3.0)]).unwrap();
         near(mean.rmse_r, (1.0 + 3.0) / 2.0 / 3.0_f64.sqrt(), 1e-9);
@@ -355,7 +355,7 @@ mod tests {
         assert_eq!(Scores::from_errors(&[]), Err(MetricError::NoPairs));
         let mut truth = Rigid::identity();
         truth.translation[0] = f64::NAN;
-        let errors = [PairError::new(None, &Rigid::identity()), PairError::new(None, &truth)];
+        let errors = [PoseError::new(None, &Rigid::identity()), PoseError::new(None, &truth)];
         assert_eq!(Scores::from_errors(&errors), Err(MetricError::NotFinite { index: 1 }));
     }
 }

@@ -84,11 +84,11 @@ impl PairFile {
 }
 
 /// Name of an array and what is wrong with it.
-type Problem = (String, String);
+type ArrayProblem = (String, String);
 
 impl GroupArrays {
     /// Takes and checks the arrays of one group.
-    fn take(arrays: &mut BTreeMap<String, Array>, group: &str) -> Result<Self, Problem> {
+    fn take(arrays: &mut BTreeMap<String, Array>, group: &str) -> Result<Self, ArrayProblem> {
         let x = take(arrays, group, "x", &[None, None, Some(3)])?;
         let n = x.shape[0];
         let y = take(arrays, group, "y", &[Some(n), None, Some(3)])?;
@@ -114,7 +114,7 @@ fn take(
     group: &str,
     suffix: &str,
     expected: &[Option<usize>],
-) -> Result<Array, Problem> {
+) -> Result<Array, ArrayProblem> {
     let name = format!("{group}_{suffix}");
     let Some(array) = arrays.remove(&name) else {
         return Err((name, format!("is missing; expected shape {}", describe(expected))));

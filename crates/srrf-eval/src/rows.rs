@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 /// A row of the tables: whose poses it scores. Printed and serialised as its name.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Row {
+pub enum TableRow {
     /// The answer of the method of this name.
     Method(Cow<'static, str>),
     /// One of several poses that a method finds on its way: method, branch. Called `<method>-<branch>`.
@@ -38,7 +38,7 @@ pub enum RowSource {
     File(usize),
 }
 
-impl Row {
+impl TableRow {
     /// The row of no correspondences at all: no motion.
     pub const IDENTITY: Self = Self::method("identity");
     /// Iterative closest point.
@@ -76,7 +76,7 @@ impl Row {
     }
 }
 
-impl fmt::Display for Row {
+impl fmt::Display for TableRow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Method(name) => f.write_str(name),
@@ -87,7 +87,7 @@ impl fmt::Display for Row {
     }
 }
 
-impl Serialize for Row {
+impl Serialize for TableRow {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
@@ -99,10 +99,10 @@ mod tests {
 
     #[test]
     fn rows_are_told_apart_by_what_they_show_and_print_their_names() {
-        assert_eq!(Row::SRRF_DENSE.to_string(), "srrf-dense");
-        assert_ne!(Row::SRRF_DENSE, Row::method("srrf-dense"));
-        assert_eq!(Row::Method("icp".to_owned().into()), Row::ICP);
-        assert_eq!(serde_json::to_value(Row::Oracle).unwrap(), "oracle");
-        assert_ne!(Row::File("icp".into()), Row::ICP);
+        assert_eq!(TableRow::SRRF_DENSE.to_string(), "srrf-dense");
+        assert_ne!(TableRow::SRRF_DENSE, TableRow::method("srrf-dense"));
+        assert_eq!(TableRow::Method("icp".to_owned().into()), TableRow::ICP);
+        assert_eq!(serde_json::to_value(TableRow::Oracle).unwrap(), "oracle");
+        assert_ne!(TableRow::File("icp".into()), TableRow::ICP);
     }
 }

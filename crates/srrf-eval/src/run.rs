@@ -3,19 +3,19 @@
 use std::time::Instant;
 
 use rayon::prelude::*;
-use srrf_cloud::{Certainty, Rigid, profile};
+use srrf_cloud::{Rigid, profile};
 use srrf_corrupt::oracle_pose;
 
 use crate::EvalError;
+use crate::answers::{Answer, PairRecord, RunOutcome};
 use crate::cache::{Cache, PairHash};
-use crate::certainty::Claim;
-use crate::chamfer::{CleanShape, SkeletonAgreement};
-use crate::found::Found;
+use crate::chamfer::CleanShape;
+use crate::kept::KeptAnswer;
 use crate::method_set::{MethodSet, source_of};
-use crate::methods::Method;
-use crate::metrics::{PairError, is_finite, is_right};
-use crate::pairs::{EvalPair, Group, PairSource};
-use crate::rows::{Row, RowSource};
+use crate::methods::ReadyMethod;
+use crate::metrics::{is_finite, is_right};
+use crate::pairs::{EvalPair, PairSource};
+use crate::rows::{RowSource, TableRow};
 use crate::transforms::Transforms;
 
 /// Pairs of each thread between two reports of progress.
@@ -26,67 +26,15 @@ pub struct Run<'a> {
     /// The pairs.
     pub pairs: &'a dyn PairSource,
     /// The methods, set up. Those that fill none of [`Run::rows`] are not run.
-    pub methods: &'a [Method],
+    pub methods: &'a [ReadyMethod],
     /// Answers of other tools, a row each.
     pub transforms: Vec<Transforms>,
     /// The rows to keep, in the order of the tables.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
     /// Worker threads, at least 1.
     pub threads: usize,
     /// Answers that were computed before, and where new ones are kept.
     pub cache: Option<&'a Cache>,
-}
-
-/// A method's answer on one pair.
-#[derive(Debug, Clone)]
-pub struct Answer {
-    /// Its errors.
-    pub error: PairError,
-    /// The pose; `None` where there is none.
-    pub pose: Option<Rigid>,
-    /// Why there is no pose.
-    pub failure: Option<String>,
-    /// Iterations that the method used.
-    pub iterations: Option<usize>,
-    /// Whether the method's own stopping rule was met.
-    pub converged: Option<bool>,
-    /// Time of the call; `None` for the oracle and transforms from a file.
-    pub seconds: Option<f64>,
-    /// How well the skeletons agree under the true pose; only in the row of a method that makes
-    /// skeletons, not in those of its branches.
-    pub skeletons: Option<SkeletonAgreement>,
-    /// How sure the method is of its pose, from methods that say so.
-    pub certainty: Option<Certainty>,
-}
-
-/// A pair with the answers of all rows.
-#[derive(Debug, Clone)]
-pub struct PairRecord {
-    /// Number of its group.
-    pub group: usize,
-    /// Its number in the group.
-    pub item: usize,
-    /// Name of the shape.
-    pub id: String,
-    /// Its category; empty if unknown.
-    pub class: String,
-    /// Whether its category is symmetric about an axis.
-    pub symmetric: bool,
-    /// The true pose.
-    pub truth: Rigid,
-    /// The answers, one for each of [`Outcome::rows`].
-    pub answers: Vec<Answer>,
-}
-
-/// All answers of a run.
-#[derive(Debug, Clone)]
-pub struct Outcome {
-    /// The groups.
-    pub groups: Vec<Group>,
-    /// The rows, in the order of the tables.
-    pub rows: Vec<Row>,
-    /// The pairs, group after group.
-    pub records: Vec<PairRecord>,
 }
 
 impl<'a> Run<'a> {
@@ -107,12 +55,18 @@ impl Run<'_> {
     /// # Errors
     /// [`EvalError`] where nothing fills a row, a pair cannot be made, or an answer not be kept. A method that fails is no
     /// error: its failures are counted.
-    pub fn execute(&self, after_chunk: &mut (dyn FnMut(usize, &str) + Send)) -> Result<Outcome, EvalError> {
+    pub fn execute(
+        &self,
+        after_chunk: &mut (dyn FnMut(usize, &str) + Send),
+    ) -> Result<RunOutcome, EvalError> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build()?;
         pool.install(|| self.execute_here(after_chunk))
     }
 
-    fn execute_here(&self, after_chunk: &mut (dyn FnMut(usize, &str) + Send)) -> Result<Outcome, EvalError> {
+    fn execute_here(
+        &self,
+        after_chunk: &mut (dyn FnMut(usize, &str) + Send),
+    ) -> Result<RunOutcome, EvalError> {
         let groups = self.pairs.groups();
         let sources = self.sources()?;
         let runs = |number: usize| {
@@ -133,7 +87,7 @@ impl Run<'_> {
             let hashes: Vec<PairHash> =
                 self.cache.map_or(Vec::new(), |_| pairs.par_iter().map(hash).collect());
             // As many as there are methods; empty for those that fill no row.
-            let answers: Vec<Vec<Found>> = self
+            let answers: Vec<Vec<KeptAnswer>> = self
                 .methods
                 .iter()
                 .enumerate()
@@ -146,7 +100,7 @@ impl Run<'_> {
             let scored: Vec<PairRecord> = (0..chunk.len())
                 .into_par_iter()
                 .map(|i| {
-                    let found: Vec<Option<&Found>> =
+                    let found: Vec<Option<&KeptAnswer>> =
                         answers.iter().map(|of_method| of_method.get(i)).collect();
                     self.record(chunk[i], &pairs[i], &sources, &found)
                 })
@@ -155,27 +109,27 @@ impl Run<'_> {
             let last = chunk.last().map_or(String::new(), |&(group, _)| groups[group].name());
             after_chunk(chunk.len(), &last);
         }
-        Ok(Outcome { groups: groups.to_vec(), rows: self.rows.clone(), records })
+        Ok(RunOutcome { groups: groups.to_vec(), rows: self.rows.clone(), records })
     }
 
     /// What fills each row.
     fn sources(&self) -> Result<Vec<RowSource>, EvalError> {
-        let source = |row: &Row| source_of(row, self.methods, &self.transforms);
-        let missing = |row: &Row| EvalError::Usage(format!("no method of this run fills the row {row}"));
+        let source = |row: &TableRow| source_of(row, self.methods, &self.transforms);
+        let missing = |row: &TableRow| EvalError::Usage(format!("no method of this run fills the row {row}"));
         self.rows.iter().map(|row| source(row).ok_or_else(|| missing(row))).collect()
     }
 
     /// One method on the pairs of a chunk; only those that the cache lacks are computed.
     fn answers(
         &self,
-        method: &Method,
+        method: &ReadyMethod,
         pairs: &[EvalPair],
         hashes: &[PairHash],
-    ) -> Result<Vec<Found>, EvalError> {
+    ) -> Result<Vec<KeptAnswer>, EvalError> {
         let Some(cache) = self.cache else {
             return Ok(self.register(method, &pairs.iter().collect::<Vec<_>>()));
         };
-        let mut known: Vec<Option<Found>> = hashes.iter().map(|hash| cache.get(method, hash)).collect();
+        let mut known: Vec<Option<KeptAnswer>> = hashes.iter().map(|hash| cache.get(method, hash)).collect();
         // Two groups may hold the same clouds; they are computed once.
         let missing: Vec<usize> =
             (0..pairs.len()).filter(|&i| known[i].is_none() && !hashes[..i].contains(&hashes[i])).collect();
@@ -192,13 +146,13 @@ impl Run<'_> {
     }
 
     /// One method on pairs, side by side.
-    fn register(&self, method: &Method, pairs: &[&EvalPair]) -> Vec<Found> {
+    fn register(&self, method: &ReadyMethod, pairs: &[&EvalPair]) -> Vec<KeptAnswer> {
         let call = |pair: &&EvalPair| {
             let pair = &pair.pair;
             let start = Instant::now();
             let answer =
                 profile::stage(method.stage, || method.register.register(&pair.source, &pair.target));
-            Found::new(answer, &pair.target_from_source, start.elapsed().as_secs_f64())
+            KeptAnswer::new(answer, &pair.target_from_source, start.elapsed().as_secs_f64())
         };
         // One part for each thread, so that none takes up another pair while the first is being timed.
         let part = pairs.len().div_ceil(self.threads.max(1)).max(1);
@@ -211,7 +165,7 @@ impl Run<'_> {
         (group, item): (usize, usize),
         pair: &EvalPair,
         sources: &[RowSource],
-        found: &[Option<&Found>],
+        found: &[Option<&KeptAnswer>],
     ) -> PairRecord {
         let clean = pair.clean.as_ref().and_then(|points| CleanShape::new(points).ok());
         let (source, target, truth) = (&pair.pair.source, &pair.pair.target, &pair.pair.target_from_source);
@@ -240,7 +194,7 @@ impl Run<'_> {
         row: RowSource,
         (group, item): (usize, usize),
         pair: &EvalPair,
-        found: &[Option<&Found>],
+        found: &[Option<&KeptAnswer>],
     ) -> Answer {
         let truth = &pair.pair.target_from_source;
         let (method, branch, own) = match row {
@@ -285,41 +239,13 @@ impl Run<'_> {
     }
 }
 
-impl Answer {
-    fn new(pose: Option<Rigid>, failure: Option<String>, truth: &Rigid) -> Self {
-        let error = PairError::new(pose.as_ref(), truth);
-        Self {
-            error,
-            pose,
-            failure,
-            iterations: None,
-            converged: None,
-            seconds: None,
-            skeletons: None,
-            certainty: None,
-        }
-    }
-
-    /// What the method says of its pose, and whether it is right; `None` from an answer without a certainty. No pose is a
-    /// claim too.
-    pub(crate) fn claim(&self) -> Option<Claim> {
-        let right = self.error.right.unwrap_or(false);
-        match self.certainty {
-            Some(c) if self.pose.is_some() => {
-                Some(Claim { probability: c.probability, abstain: c.abstain, right })
-            }
-            _ if self.pose.is_none() => Some(Claim::NO_POSE),
-            _ => None,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use srrf_cloud::{Branch, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, Solid};
     use srrf_corrupt::{CorruptionKind, PairConfig, Severity};
 
     use super::*;
+    use crate::certainty::Claim;
     use crate::data;
     use crate::protocol::{Protocol, SynthesizedPairs};
 
@@ -364,15 +290,15 @@ mod tests {
         SynthesizedPairs::new(data::procedural(11).unwrap(), protocol).unwrap()
     }
 
-    fn run(pairs: &SynthesizedPairs, threads: usize) -> Outcome {
+    fn run(pairs: &SynthesizedPairs, threads: usize) -> RunOutcome {
         cached(pairs, threads, None)
     }
 
-    fn cached(pairs: &SynthesizedPairs, threads: usize, cache: Option<&Cache>) -> Outcome {
-        let moody = Method { branches: &["left", "right"], ..Method::new(Moody) };
-        let icp = Method::new(srrf_classical::Icp::default());
+    fn cached(pairs: &SynthesizedPairs, threads: usize, cache: Option<&Cache>) -> RunOutcome {
+        let moody = ReadyMethod { branches: &["left", "right"], ..ReadyMethod::new(Moody) };
+        let icp = ReadyMethod::new(srrf_classical::Icp::default());
         let methods = [moody, icp];
-        let rows = [&[Row::ICP, Row::Oracle][..], &methods[0].rows()].concat();
+        let rows = [&[TableRow::ICP, TableRow::Oracle][..], &methods[0].rows()].concat();
         let run = Run { pairs, methods: &methods, transforms: vec![], rows, threads, cache };
         let mut done = 0;
         let outcome = run.execute(&mut |pairs, _| done += pairs).unwrap();
@@ -437,7 +363,7 @@ mod tests {
     #[test]
     fn a_row_that_nothing_fills_is_an_error() {
         let pairs = pairs();
-        let rows = vec![Row::DCP];
+        let rows = vec![TableRow::DCP];
         let run = Run { pairs: &pairs, methods: &[], transforms: vec![], rows, threads: 1, cache: None };
         assert!(run.execute(&mut |_, _| {}).unwrap_err().to_string().contains("dcp"));
     }

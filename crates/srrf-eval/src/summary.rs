@@ -3,12 +3,12 @@
 use serde::{Serialize, Serializer};
 
 use crate::EvalError;
+use crate::answers::RunOutcome;
 use crate::certainty::{CertaintyScores, Claim};
 use crate::chamfer::SkeletonAgreement;
-use crate::metrics::{PairError, Scores};
+use crate::metrics::{PoseError, Scores};
 use crate::protocol::CLEAN;
-use crate::rows::Row;
-use crate::run::Outcome;
+use crate::rows::TableRow;
 
 /// Which severities a row of the summary covers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,7 +45,7 @@ pub struct SummaryRow {
     /// A number, or `mean`: the mean of the values of the severities.
     pub severity: SeverityKey,
     /// The row of the tables.
-    pub method: Row,
+    pub method: TableRow,
     /// Scores over all pairs.
     #[serde(flatten)]
     pub scores: Scores,
@@ -70,11 +70,11 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Sums up a run.
+    /// CertaintySums up a run.
     ///
     /// # Errors
     /// [`EvalError::Metric`] where a true pose is not finite.
-    pub fn of(outcome: &Outcome) -> Result<Self, EvalError> {
+    pub fn of(outcome: &RunOutcome) -> Result<Self, EvalError> {
         let mut rows: Vec<SummaryRow> = Vec::new();
         let mut start = 0;
         while start < outcome.groups.len() {
@@ -100,7 +100,7 @@ impl Summary {
     }
 
     /// The row of these keys.
-    pub fn get(&self, corruption: &str, severity: SeverityKey, method: &Row) -> Option<&SummaryRow> {
+    pub fn get(&self, corruption: &str, severity: SeverityKey, method: &TableRow) -> Option<&SummaryRow> {
         self.rows.iter().find(|r| r.corruption == corruption && r.severity == severity && r.method == *method)
     }
 
@@ -110,12 +110,12 @@ impl Summary {
     }
 
     /// The methods, in order.
-    pub fn methods(&self) -> Vec<&Row> {
+    pub fn methods(&self) -> Vec<&TableRow> {
         distinct(self.rows.iter().map(|r| &r.method))
     }
 
     /// How well a method knows whether it is right, over all pairs; `None` for methods that do not say.
-    pub fn certainty(&self, method: &Row) -> Option<CertaintyScores> {
+    pub fn certainty(&self, method: &TableRow) -> Option<CertaintyScores> {
         let means = self.rows.iter().filter(|r| r.method == *method && r.severity == SeverityKey::Mean);
         CertaintyScores::together(means.filter_map(|r| r.certainty.as_ref()))
     }
@@ -124,7 +124,7 @@ impl Summary {
     /// there are fewer than two.
     pub(crate) fn over_corruptions(
         &self,
-        method: &Row,
+        method: &TableRow,
         value: impl Fn(&SummaryRow) -> Option<f64>,
     ) -> Option<f64> {
         let corruptions = self.corruptions().into_iter().filter(|c| *c != CLEAN);
@@ -160,10 +160,10 @@ fn distinct<'a, T: PartialEq + ?Sized>(names: impl Iterator<Item = &'a T>) -> Ve
 }
 
 /// One group and method.
-fn row(outcome: &Outcome, group: usize, method: usize) -> Result<SummaryRow, EvalError> {
+fn row(outcome: &RunOutcome, group: usize, method: usize) -> Result<SummaryRow, EvalError> {
     let of_group = || outcome.records.iter().filter(|r| r.group == group);
-    let errors: Vec<PairError> = of_group().map(|r| r.answers[method].error).collect();
-    let asymmetric: Vec<PairError> =
+    let errors: Vec<PoseError> = of_group().map(|r| r.answers[method].error).collect();
+    let asymmetric: Vec<PoseError> =
         of_group().filter(|r| !r.symmetric).map(|r| r.answers[method].error).collect();
     let seconds: Vec<f64> = of_group().filter_map(|r| r.answers[method].seconds).collect();
     let skeletons: Vec<SkeletonAgreement> = of_group().filter_map(|r| r.answers[method].skeletons).collect();
@@ -171,7 +171,7 @@ fn row(outcome: &Outcome, group: usize, method: usize) -> Result<SummaryRow, Eva
     let says = outcome.records.iter().any(|r| r.answers[method].certainty.is_some());
     let claims: Vec<Claim> =
         of_group().filter(|_| says).map(|r| r.answers[method].claim().unwrap_or(Claim::NO_POSE)).collect();
-    let scores = |errors: &[PairError]| {
+    let scores = |errors: &[PoseError]| {
         Scores::from_errors(errors).map_err(|source| EvalError::Metric {
             group: outcome.groups[group].name(),
             method: outcome.rows[method].to_string(),
@@ -214,12 +214,12 @@ pub(crate) mod tests {
     use srrf_cloud::{Certainty, EulerXyz, Rigid};
 
     use super::*;
+    use crate::answers::{Answer, PairRecord};
     use crate::pairs::Group;
-    use crate::run::{Answer, PairRecord};
 
     /// Clean and cutout at severities 1 and 3, two pairs each, one of them symmetric. Method `a` is
     /// off by 1 degree per severity (2 on symmetric shapes), `b` by 10 times as much; `b` says how sure it is.
-    pub(crate) fn outcome() -> Outcome {
+    pub(crate) fn outcome() -> RunOutcome {
         let group = |corruption: &str, severity| Group { corruption: corruption.into(), severity, pairs: 2 };
         let groups = vec![group("clean", 0), group("cutout", 1), group("cutout", 3)];
         let mut records = Vec::new();
@@ -230,9 +230,9 @@ pub(crate) mod tests {
                     let angle = scale * f64::from(group.severity) * if symmetric { 2.0 } else { 1.0 };
                     let rotation = EulerXyz::from_deg([angle, 0.0, 0.0]).to_matrix();
                     let pose = Rigid { rotation, ..Rigid::identity() };
-                    let error = PairError::new(Some(&pose), &Rigid::identity());
+                    let error = PoseError::new(Some(&pose), &Rigid::identity());
                     Answer {
-                        error: PairError { right: Some(error.rotation_deg < 5.0), ..error },
+                        error: PoseError { right: Some(error.rotation_deg < 5.0), ..error },
                         pose: Some(pose),
                         failure: None,
                         iterations: Some(4),
@@ -258,7 +258,7 @@ pub(crate) mod tests {
                 });
             }
         }
-        Outcome { groups, rows: vec![Row::method("a"), Row::method("b")], records }
+        RunOutcome { groups, rows: vec![TableRow::method("a"), TableRow::method("b")], records }
     }
 
     #[test]
@@ -281,7 +281,7 @@ pub(crate) mod tests {
                 "cutout mean b"
             ]
         );
-        let at = |severity| summary.get("cutout", severity, &Row::method("a")).unwrap();
+        let at = |severity| summary.get("cutout", severity, &TableRow::method("a")).unwrap();
         let three = at(SeverityKey::One(3));
         assert!((three.scores.mean_rot_deg - 4.5).abs() < 1e-9);
         assert!((three.no_symmetric.unwrap().mean_rot_deg - 3.0).abs() < 1e-9);
@@ -328,7 +328,7 @@ pub(crate) mod tests {
     #[test]
     fn certainty_is_over_all_pairs_of_a_corruption_and_of_the_run() {
         let summary = Summary::of(&outcome()).unwrap();
-        let b = Row::method("b");
+        let b = TableRow::method("b");
         let of =
             |corruption: &str| summary.get(corruption, SeverityKey::Mean, &b).unwrap().certainty.unwrap();
         assert_eq!((of("clean").right_of_answered, of("clean").answered), (Some(1.0), 1.0));
@@ -337,7 +337,7 @@ pub(crate) mod tests {
         assert!((cutout.brier - 0.81).abs() < 1e-12 && (cutout.calibration_error - 0.9).abs() < 1e-12);
         let all = summary.certainty(&b).unwrap();
         assert_eq!((all.pairs, all.answered), (6, 4.0 / 6.0));
-        assert!(summary.certainty(&Row::method("a")).is_none(), "a does not say");
+        assert!(summary.certainty(&TableRow::method("a")).is_none(), "a does not say");
         let json = serde_json::to_value(&summary).unwrap();
         assert_eq!(json[1]["certainty"]["pairs"], 2);
         assert!(json[0].get("certainty").is_none());

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use srrf_corrupt::Pair;
-use srrf_eval::{MetricError, PairError, Scores};
+use srrf_eval::{MetricError, PoseError, Scores};
 
 use crate::seam::{Found, Trained};
 use crate::step::to_batch;
@@ -56,13 +56,13 @@ pub fn validate<C: Trained>(
     };
     let results = workers.map(chunks.len(), run).ok_or(ValidateError::Failed)?;
 
-    let mut errors: Vec<Vec<PairError>> = vec![Vec::new(); C::ROWS.len()];
+    let mut errors: Vec<Vec<PoseError>> = vec![Vec::new(); C::ROWS.len()];
     let mut notes = BTreeMap::new();
     for (chunk, result) in chunks.iter().zip(results) {
         let (poses, found_notes) = result?;
         for (errors, poses) in errors.iter_mut().zip(poses) {
             let truths = chunk.iter().map(|pair| &pair.target_from_source);
-            errors.extend(poses.iter().zip(truths).map(|(p, truth)| PairError::new(p.as_ref(), truth)));
+            errors.extend(poses.iter().zip(truths).map(|(p, truth)| PoseError::new(p.as_ref(), truth)));
         }
         for (name, value) in found_notes {
             *notes.entry(name).or_insert(0.0) += value * chunk.len() as f64 / pairs.len() as f64;

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use clap::Parser;
 use srrf_cloud::{KnnIndex, Register, Rigid, SoftMatch};
 use srrf_corrupt::{CorruptionKind, Pair, Severity};
-use srrf_eval::{PairError, Scores};
+use srrf_eval::{PoseError, Scores};
 use srrf_model::{SrrfRegister, device, embedded, keep_freed_memory, network_frame};
 use srrf_train::TrainConfig;
 use srrf_train::data::{TrainingPairs, training_shapes};
@@ -44,7 +44,7 @@ const STANDARD_ERRORS: [f64; 6] = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
 /// What a rule may look at, and what it is scored by.
 struct Judged {
     corruption: Option<(CorruptionKind, Severity)>,
-    errors: [PairError; 3],
+    errors: [PoseError; 3],
     /// Of each threshold: points that only the dense pose brings near, only the skeleton's, and both.
     near: [[f64; 3]; THRESHOLDS.len()],
     /// Points of both clouds.
@@ -74,7 +74,7 @@ fn judge(method: &SrrfRegister, pair: &Pair) -> Option<Judged> {
     };
     let near = counts(&by_dense, &by_skeleton, scale);
     let matches = counts(&residuals(&dense), &residuals(&skeleton), scale);
-    let error = |pose: &Rigid| PairError::new(Some(pose), &pair.target_from_source);
+    let error = |pose: &Rigid| PoseError::new(Some(pose), &pair.target_from_source);
     Some(Judged {
         corruption: pair.corruption,
         errors: [error(&dense), error(&skeleton), error(&answer.target_from_source)],
@@ -121,7 +121,7 @@ fn scores(
     let mut sum = [0.0; 2];
     for row in &rows {
         let of_row = pairs.iter().filter(|pair| pair.corruption == Some(*row));
-        let errors: Vec<PairError> = of_row.map(|pair| pair.errors[choose(pair) as usize]).collect();
+        let errors: Vec<PoseError> = of_row.map(|pair| pair.errors[choose(pair) as usize]).collect();
         let s = Scores::from_errors(&errors)?;
         sum[0] += s.rmse_r;
         sum[1] += s.mae_r;

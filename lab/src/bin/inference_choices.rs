@@ -13,7 +13,7 @@ use rand::rngs::ChaCha8Rng;
 use srrf_cloud::{PointCloud, Register, Registration, Rigid};
 use srrf_corrupt::crop::{crop, random_direction};
 use srrf_corrupt::{CorruptionKind, Pair, Severity};
-use srrf_eval::{MetricError, PairError, Scores};
+use srrf_eval::{MetricError, PoseError, Scores};
 use srrf_model::{
     BranchKind, InferenceConfig, InlierTest, IntegrationConfig, Matches, SrrfConfig, SrrfRegister, device,
     embedded, keep_freed_memory,
@@ -312,7 +312,7 @@ fn errors_of<const N: usize>(
     pairs: &[Pair],
     workers: &Workers,
     columns: Columns<N>,
-) -> Result<Vec<Vec<PairError>>, Box<dyn std::error::Error>> {
+) -> Result<Vec<Vec<PoseError>>, Box<dyn std::error::Error>> {
     let answers = workers
         .map(pairs.len(), |i| {
             let answer = method.register(&pairs[i].source, &pairs[i].target).ok()?;
@@ -322,7 +322,7 @@ fn errors_of<const N: usize>(
     let of_column = |column: usize| {
         let both = pairs.iter().zip(&answers);
         both.map(|(pair, poses)| {
-            PairError::new(poses.and_then(|p| p[column]).as_ref(), &pair.target_from_source)
+            PoseError::new(poses.and_then(|p| p[column]).as_ref(), &pair.target_from_source)
         })
         .collect()
     };
@@ -330,9 +330,9 @@ fn errors_of<const N: usize>(
 }
 
 /// `RMSE / MAE / median` of each column, over the pairs that are wanted.
-fn scores(errors: &[Vec<PairError>], wanted: impl Fn(usize) -> bool) -> Result<String, MetricError> {
-    let of_column = |errors: &Vec<PairError>| {
-        let chosen: Vec<PairError> = (0..errors.len()).filter(|&i| wanted(i)).map(|i| errors[i]).collect();
+fn scores(errors: &[Vec<PoseError>], wanted: impl Fn(usize) -> bool) -> Result<String, MetricError> {
+    let of_column = |errors: &Vec<PoseError>| {
+        let chosen: Vec<PoseError> = (0..errors.len()).filter(|&i| wanted(i)).map(|i| errors[i]).collect();
         let s = Scores::from_errors(&chosen)?;
         Ok(format!("{:.2} / {:.2} / {:.2}", s.rmse_r, s.mae_r, s.median_rot_deg))
     };

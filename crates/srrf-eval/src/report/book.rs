@@ -69,7 +69,7 @@ fn pages(document: &Document) -> Vec<(String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::document::Figure;
+    use crate::report::document::Picture;
     use crate::report::sheet::{Cell, Sheet};
 
     fn document() -> Document {
@@ -80,7 +80,7 @@ mod tests {
         sheet.rows.push(vec!["x".into(), Cell::Number(1.25, 1)]);
         tables.sheets.push(sheet);
         let mut severity = Section::new("severity", "Severities");
-        severity.figures.push(Figure { file: "s.svg".into(), caption: "c".into(), svg: "<svg/>".into() });
+        severity.figures.push(Picture { file: "s.svg".into(), caption: "c".into(), svg: "<svg/>".into() });
         let mut views = Section::new("pairs", "Pairs");
         views.html = "<canvas>".into();
         let facts = vec![("Command".into(), "srrf-eval tables".into()), ("Seed".into(), "1".into())];

@@ -5,7 +5,7 @@ use plotters::prelude::*;
 
 use crate::protocol::CLEAN;
 use crate::quantities::Quantity;
-use crate::rows::Row;
+use crate::rows::TableRow;
 use crate::summary::{SeverityKey, Summary};
 
 /// Colours that people with any colour vision can tell apart (Okabe and Ito 2008).
@@ -48,7 +48,7 @@ pub(crate) fn svg(quantity: &Quantity, summary: &Summary) -> Result<Option<Strin
 
     let clean = summary.corruptions().contains(&CLEAN);
     let first = if clean { 0 } else { severities[0] };
-    let curve = |corruption: &str, method: &Row| -> Vec<(f64, f64)> {
+    let curve = |corruption: &str, method: &TableRow| -> Vec<(f64, f64)> {
         let clean = clean.then_some((CLEAN, 0));
         let points = clean.into_iter().chain(severities.iter().map(|&s| (corruption, s)));
         points
@@ -83,7 +83,7 @@ pub(crate) fn svg(quantity: &Quantity, summary: &Summary) -> Result<Option<Strin
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-fn draw_legend(area: &Area<'_>, title: &str, methods: &[&Row]) -> Drawn {
+fn draw_legend(area: &Area<'_>, title: &str, methods: &[&TableRow]) -> Drawn {
     let text = |size: i32| ("sans-serif", size).into_font().color(&BLACK);
     area.draw(&Text::new(title.to_owned(), (12, 8), text(16)))?;
     let mut x = 12;

@@ -26,13 +26,13 @@ pub(crate) struct Section {
     /// Tables.
     pub sheets: Vec<Sheet>,
     /// Pictures.
-    pub figures: Vec<Figure>,
+    pub figures: Vec<Picture>,
     /// HTML for the page alone, as it is.
     pub html: String,
 }
 
 /// A picture.
-pub(crate) struct Figure {
+pub(crate) struct Picture {
     /// Name of its file.
     pub file: String,
     /// What it shows.
@@ -100,7 +100,7 @@ impl Document {
     }
 
     /// All pictures.
-    pub fn figures(&self) -> impl Iterator<Item = &Figure> {
+    pub fn figures(&self) -> impl Iterator<Item = &Picture> {
         self.sections.iter().flat_map(|s| &s.figures)
     }
 }

@@ -25,8 +25,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::EvalError;
+use crate::answers::RunOutcome;
 use crate::quantities::QUANTITIES;
-use crate::run::Outcome;
 use crate::summary::Summary;
 
 /// Makes the folder `out` and checks that it can be written to.
@@ -49,7 +49,7 @@ pub fn write(
     out: &Path,
     meta: &Meta,
     summary: &Summary,
-    outcome: &Outcome,
+    outcome: &RunOutcome,
 ) -> Result<Vec<PathBuf>, EvalError> {
     let mut written = Vec::new();
     let mut text = |name: &str, content: &str| {

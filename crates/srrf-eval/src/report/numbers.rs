@@ -8,7 +8,7 @@ use crate::certainty::CertaintyScores;
 use crate::methods::is_ours;
 use crate::protocol::CLEAN;
 use crate::quantities::QUANTITIES;
-use crate::rows::Row;
+use crate::rows::TableRow;
 use crate::summary::{SeverityKey, Summary, SummaryRow};
 
 /// Printed numbers by key.
@@ -73,27 +73,27 @@ fn of_methods(numbers: &mut Numbers, main: &Summary) {
 
 /// A row of the README's table: the product over the pairs of these corruptions, and the best other method.
 fn readme(numbers: &mut Numbers, name: &str, summary: &Summary, corruptions: &[&str]) {
-    let rows = |method: &Row| -> Vec<&SummaryRow> {
+    let rows = |method: &TableRow| -> Vec<&SummaryRow> {
         corruptions.iter().filter_map(|c| summary.get(c, SeverityKey::Mean, method)).collect()
     };
-    let mean = |method: &Row, value: fn(&SummaryRow) -> Option<f64>| -> Option<f64> {
+    let mean = |method: &TableRow, value: fn(&SummaryRow) -> Option<f64>| -> Option<f64> {
         let values: Vec<f64> = rows(method).into_iter().map(value).collect::<Option<_>>()?;
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     };
-    let right = |method: &Row| mean(method, |row| row.scores.right).map(|share| 100.0 * share);
-    let seconds = |method: &Row| mean(method, |row| row.seconds_per_pair);
+    let right = |method: &TableRow| mean(method, |row| row.scores.right).map(|share| 100.0 * share);
+    let seconds = |method: &TableRow| mean(method, |row| row.seconds_per_pair);
     let mut put = |what: &str, value: Option<String>| {
         numbers.extend(value.map(|value| (format!("readme.{name}.{what}"), value)));
     };
     let percent = |value: Option<f64>| value.map(|v| format!("{v:.1}"));
     let time = |value: Option<f64>| value.map(|v| format!("{v:.2}"));
-    let ours = Row::SRRF_REGISTER;
+    let ours = TableRow::SRRF_REGISTER;
     let certainty = CertaintyScores::together(rows(&ours).into_iter().filter_map(|r| r.certainty.as_ref()));
     put("right", percent(right(&ours)));
     put("right_answered", percent(certainty.and_then(|c| Some(100.0 * c.right_of_answered?))));
     put("answered", percent(certainty.map(|c| 100.0 * c.answered)));
     put("seconds", time(seconds(&ours)));
-    let peers = summary.methods().into_iter().filter(|m| **m != Row::Oracle && !is_ours(m));
+    let peers = summary.methods().into_iter().filter(|m| **m != TableRow::Oracle && !is_ours(m));
     let best = peers.filter_map(|m| Some((m, right(m)?))).reduce(|a, b| if b.1 > a.1 { b } else { a });
     if let Some((peer, share)) = best {
         put("peer", Some(peer.to_string()));
@@ -110,7 +110,7 @@ mod tests {
 
     fn summary() -> Summary {
         let mut outcome = outcome();
-        outcome.rows = vec![Row::ICP, Row::SRRF_REGISTER];
+        outcome.rows = vec![TableRow::ICP, TableRow::SRRF_REGISTER];
         Summary::of(&outcome).unwrap()
     }
 

@@ -65,7 +65,7 @@ fn section(section: &Section) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::document::Figure;
+    use crate::report::document::Picture;
     use crate::report::sheet::Sheet;
 
     #[test]
@@ -74,7 +74,7 @@ mod tests {
         let mut part = Section::new("part", evil);
         part.text.push(evil.into());
         part.list.push(evil.into());
-        part.figures.push(Figure { file: "a.svg".into(), caption: evil.into(), svg: "<svg></svg>".into() });
+        part.figures.push(Picture { file: "a.svg".into(), caption: evil.into(), svg: "<svg></svg>".into() });
         let mut sheet = Sheet::new("t", evil, evil, &[evil]);
         sheet.rows.push(vec![evil.into()]);
         part.sheets.push(sheet);

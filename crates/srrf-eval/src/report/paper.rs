@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use crate::metrics::Scores;
-use crate::rows::Row;
+use crate::rows::TableRow;
 
 /// The rows of the paper's tables 1 to 4 as they are printed.
 const TEXT: &str = include_str!("../../data/paper.csv");
@@ -13,14 +13,14 @@ const TEXT: &str = include_str!("../../data/paper.csv");
 pub(crate) const SKELETON_CHAMFER: [f64; 2] = [3.85, 1.83];
 
 /// Methods of tables 1 to 3, as our rows, in the paper's order.
-pub(crate) static METHODS: [Row; 7] = [
-    Row::ICP,
-    Row::method("pointnetlk"),
-    Row::DCP,
-    Row::RGM,
-    Row::method("panet"),
-    Row::method("equi-gspr"),
-    Row::SRRF,
+pub(crate) static METHODS: [TableRow; 7] = [
+    TableRow::ICP,
+    TableRow::method("pointnetlk"),
+    TableRow::DCP,
+    TableRow::RGM,
+    TableRow::method("panet"),
+    TableRow::method("equi-gspr"),
+    TableRow::SRRF,
 ];
 
 /// A row of one of the tables 1 to 4.
@@ -31,7 +31,7 @@ pub(crate) struct PaperRow {
     /// Our name of the corruption; in table 4 the paper's name of the sampling.
     pub corruption: &'static str,
     /// Our row of the method.
-    pub method: Row,
+    pub method: TableRow,
     /// MSE, RMSE and MAE of the rotation in degrees, then of the translation.
     pub values: [f64; 6],
 }
@@ -46,12 +46,12 @@ fn row(line: &'static str) -> Option<PaperRow> {
     let cells: Vec<&'static str> = line.split(',').collect();
     let (&[table, corruption, method], numbers) = cells.split_first_chunk::<3>()?;
     let numbers: Vec<f64> = numbers.iter().map(|n| n.parse().ok()).collect::<Option<_>>()?;
-    let method = Row::method(method);
+    let method = TableRow::method(method);
     Some(PaperRow { table: table.parse().ok()?, corruption, method, values: numbers.try_into().ok()? })
 }
 
 /// The paper's numbers for a corruption and a method, if it has them.
-pub(crate) fn find(corruption: &str, method: &Row) -> Option<&'static PaperRow> {
+pub(crate) fn find(corruption: &str, method: &TableRow) -> Option<&'static PaperRow> {
     rows().iter().find(|r| r.corruption == corruption && r.method == *method)
 }
 
@@ -85,7 +85,8 @@ mod tests {
         for row in rows() {
             for (at, slack) in [(0, 2e-6), (3, 1e-3)] {
                 let (mse, rmse) = (row.values[at], row.values[at + 1]);
-                let wrong_in_the_paper = row.corruption == "gaussian" && row.method == Row::ICP && at == 3;
+                let wrong_in_the_paper =
+                    row.corruption == "gaussian" && row.method == TableRow::ICP && at == 3;
                 assert_eq!((mse.sqrt() - rmse).abs() > slack, wrong_in_the_paper, "{row:?}");
             }
         }

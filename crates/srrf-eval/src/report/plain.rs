@@ -59,12 +59,12 @@ error of the identity, and never as recalled. `oracle` fits a pose to the true c
 for least squares on matches. The best method beside it is in bold.
 ";
 
-/// How to read a value from [`Scores`].
-type Value = fn(&Scores) -> Option<f64>;
+/// A column of `table.csv`.
+type ScoreField = (&'static str, fn(&Scores) -> Option<f64>);
 
 /// `table.csv`: one line for each row of the summary; fields that do not apply are empty.
 pub(crate) fn csv(summary: &Summary) -> String {
-    let fields: [(&str, Value); 14] = [
+    let fields: [ScoreField; 14] = [
         ("mse_r", |s| Some(s.mse_r)),
         ("rmse_r", |s| Some(s.rmse_r)),
         ("mae_r", |s| Some(s.mae_r)),

@@ -8,40 +8,40 @@ use srrf_cloud::io::write_atomically;
 use srrf_cloud::{EulerXyz, Rigid};
 
 use super::Meta;
+use crate::answers::{Answer, PairRecord, RunOutcome};
 use crate::chamfer::SkeletonAgreement;
-use crate::rows::Row;
-use crate::run::{Answer, Outcome, PairRecord};
+use crate::rows::TableRow;
 use crate::summary::Summary;
 
 /// Writes the file.
 ///
 /// # Errors
 /// Those of the file system.
-pub(super) fn write(path: &Path, meta: &Meta, summary: &Summary, outcome: &Outcome) -> io::Result<()> {
+pub(super) fn write(path: &Path, meta: &Meta, summary: &Summary, outcome: &RunOutcome) -> io::Result<()> {
     write_atomically(path, |out| {
-        serde_json::to_writer(&mut *out, &Results { meta, summary, pairs: Pairs(outcome) })?;
+        serde_json::to_writer(&mut *out, &ResultsFile { meta, summary, pairs: ResultPairs(outcome) })?;
         out.write_all(b"\n")
     })
 }
 
 #[derive(Serialize)]
-struct Results<'a> {
+struct ResultsFile<'a> {
     meta: &'a Meta,
     summary: &'a Summary,
-    pairs: Pairs<'a>,
+    pairs: ResultPairs<'a>,
 }
 
 /// One object for each pair.
-struct Pairs<'a>(&'a Outcome);
+struct ResultPairs<'a>(&'a RunOutcome);
 
-impl Serialize for Pairs<'_> {
+impl Serialize for ResultPairs<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_seq(self.0.records.iter().map(|record| PairRow::new(self.0, record)))
+        serializer.collect_seq(self.0.records.iter().map(|record| ResultPair::new(self.0, record)))
     }
 }
 
 #[derive(Serialize)]
-struct PairRow<'a> {
+struct ResultPair<'a> {
     corruption: &'a str,
     severity: u8,
     item: usize,
@@ -53,8 +53,8 @@ struct PairRow<'a> {
     methods: Answers<'a>,
 }
 
-impl<'a> PairRow<'a> {
-    fn new(outcome: &'a Outcome, record: &'a PairRecord) -> Self {
+impl<'a> ResultPair<'a> {
+    fn new(outcome: &'a RunOutcome, record: &'a PairRecord) -> Self {
         let group = &outcome.groups[record.group];
         Self {
             corruption: &group.corruption,
@@ -75,7 +75,7 @@ fn euler_deg(pose: &Rigid) -> [f64; 3] {
 }
 
 /// The answers by name of the method, in the order of the tables.
-struct Answers<'a>(&'a [Row], &'a [Answer]);
+struct Answers<'a>(&'a [TableRow], &'a [Answer]);
 
 impl Serialize for Answers<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

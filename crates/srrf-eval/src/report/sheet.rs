@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::rows::Row;
+use crate::rows::TableRow;
 
 /// A cell of a [`Sheet`].
 #[derive(Debug, Clone, PartialEq)]
@@ -41,8 +41,8 @@ impl Cell {
     }
 }
 
-impl From<&Row> for Cell {
-    fn from(row: &Row) -> Self {
+impl From<&TableRow> for Cell {
+    fn from(row: &TableRow) -> Self {
         Self::Text(row.to_string())
     }
 }

@@ -13,7 +13,7 @@ use crate::summary::Summary;
 
 /// What was scored in one part of the report.
 #[derive(Serialize)]
-pub(crate) struct Part<'a> {
+pub(crate) struct ReportPart<'a> {
     /// Name of the part, or of the network of a variant.
     pub part: &'a str,
     /// The data, and how the pairs were made.
@@ -26,7 +26,11 @@ pub(crate) struct Part<'a> {
 ///
 /// # Errors
 /// [`EvalError::Output`] names the file that cannot be written.
-pub(crate) fn all(out: &Path, document: &Document, parts: &[Part<'_>]) -> Result<Vec<String>, EvalError> {
+pub(crate) fn all(
+    out: &Path,
+    document: &Document,
+    parts: &[ReportPart<'_>],
+) -> Result<Vec<String>, EvalError> {
     let mut names = Vec::new();
     let mut put = |name: String, content: &str| {
         file(out, &name, content)?;
@@ -56,13 +60,13 @@ pub(crate) fn file(out: &Path, name: &str, content: &str) -> Result<(), EvalErro
 }
 
 /// All summaries, with where they come from.
-fn json(document: &Document, parts: &[Part<'_>]) -> Result<String, EvalError> {
+fn json(document: &Document, parts: &[ReportPart<'_>]) -> Result<String, EvalError> {
     #[derive(Serialize)]
-    struct Results<'a> {
+    struct ResultsFile<'a> {
         facts: &'a [(String, String)],
-        parts: &'a [Part<'a>],
+        parts: &'a [ReportPart<'a>],
     }
-    let results = Results { facts: &document.facts, parts };
+    let results = ResultsFile { facts: &document.facts, parts };
     serde_json::to_string(&results)
         .map(|text| text + "\n")
         .map_err(|e| EvalError::Output { path: "results.json".into(), source: io::Error::from(e) })

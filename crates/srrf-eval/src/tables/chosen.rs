@@ -4,20 +4,20 @@ use srrf_cloud::Register;
 use srrf_view::{Number, Pair as ViewPair, Pose, Up, viewer_element};
 
 use crate::EvalError;
+use crate::answers::{PairRecord, RunOutcome};
 use crate::pairs::{EvalPair, PairSource};
-use crate::rows::Row;
-use crate::run::{Outcome, PairRecord};
+use crate::rows::TableRow;
 
 /// The severity of the pairs shown.
 const SEVERITY: u8 = 3;
 /// Pairs on which the network did worst, beside a typical one of each corruption.
 const WORST: usize = 3;
 /// The row by whose error pairs are chosen.
-const BY: Row = Row::SRRF;
+const BY: TableRow = TableRow::SRRF;
 
 /// A pair to show, and why.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Choice {
+struct ChosenPair {
     record: usize,
     why: &'static str,
 }
@@ -29,7 +29,7 @@ struct Choice {
 /// [`EvalError`] where a pair cannot be made.
 pub(crate) fn viewer(
     pairs: &dyn PairSource,
-    outcome: &Outcome,
+    outcome: &RunOutcome,
     skeletons: Option<&dyn Register>,
 ) -> Result<String, EvalError> {
     let choices = choose(outcome);
@@ -46,7 +46,7 @@ pub(crate) fn viewer(
 }
 
 fn view<'a>(
-    outcome: &Outcome,
+    outcome: &RunOutcome,
     record: &PairRecord,
     why: &str,
     made: &'a EvalPair,
@@ -80,10 +80,10 @@ fn view<'a>(
 
 /// The pair of median error of each corruption at the middle severity (asymmetric shapes, where there
 /// are some), and the worst pairs of all.
-fn choose(outcome: &Outcome) -> Vec<Choice> {
+fn choose(outcome: &RunOutcome) -> Vec<ChosenPair> {
     let row = outcome.rows.iter().position(|r| *r == BY).unwrap_or(0);
     let error = |index: &usize| outcome.records[*index].answers[row].error.rotation_deg;
-    let mut chosen: Vec<Choice> = Vec::new();
+    let mut chosen: Vec<ChosenPair> = Vec::new();
     for (group, named) in outcome.groups.iter().enumerate() {
         if ![0, SEVERITY].contains(&named.severity) {
             continue;
@@ -94,14 +94,14 @@ fn choose(outcome: &Outcome) -> Vec<Choice> {
             of_group.iter().copied().filter(|&i| !outcome.records[i].symmetric).collect();
         let mut ranked = if asymmetric.is_empty() { of_group } else { asymmetric };
         ranked.sort_by(|a, b| error(a).total_cmp(&error(b)));
-        chosen.extend(ranked.get(ranked.len() / 2).map(|&record| Choice { record, why: "" }));
+        chosen.extend(ranked.get(ranked.len() / 2).map(|&record| ChosenPair { record, why: "" }));
     }
     let mut all: Vec<usize> = (0..outcome.records.len()).collect();
     all.sort_by(|a, b| error(b).total_cmp(&error(a)));
     let worst =
         all.into_iter().filter(|&i| !outcome.records[i].symmetric && !chosen.iter().any(|c| c.record == i));
-    let worst: Vec<Choice> =
-        worst.take(WORST).map(|record| Choice { record, why: " (among the worst)" }).collect();
+    let worst: Vec<ChosenPair> =
+        worst.take(WORST).map(|record| ChosenPair { record, why: " (among the worst)" }).collect();
     chosen.extend(worst);
     chosen
 }
@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn typical_pairs_of_the_middle_severity_then_the_worst() {
         let mut outcome = outcome();
-        outcome.rows = vec![Row::ICP, Row::SRRF];
+        outcome.rows = vec![TableRow::ICP, TableRow::SRRF];
         let chosen = choose(&outcome);
         // Clean and cutout at 3, without the symmetric shape; then what is left and not symmetric.
         let records: Vec<(usize, usize)> = chosen

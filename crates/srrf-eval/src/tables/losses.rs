@@ -3,13 +3,13 @@
 use crate::methods::is_ours;
 use crate::quantities::{QUANTITIES, Quantity};
 use crate::report::paper;
-use crate::rows::Row;
+use crate::rows::TableRow;
 use crate::summary::{SeverityKey, Summary};
 
 /// Sentences, one for each loss that shows in the printed digits; empty where the run lacks `srrf`.
 pub(crate) fn losses(summary: &Summary) -> Vec<String> {
     let mut found = Vec::new();
-    for ours in [Row::SRRF, Row::SRRF_REFINE, Row::SRRF_REGISTER] {
+    for ours in [TableRow::SRRF, TableRow::SRRF_REFINE, TableRow::SRRF_REGISTER] {
         for quantity in QUANTITIES.iter().filter(|q| ["rmse_r", "median_rot_deg", "recall"].contains(&q.key))
         {
             for corruption in summary.corruptions() {
@@ -25,8 +25,8 @@ pub(crate) fn losses(summary: &Summary) -> Vec<String> {
         .corruptions()
         .into_iter()
         .filter_map(|corruption| {
-            let ours = summary.get(corruption, SeverityKey::Mean, &Row::SRRF)?.scores.rmse_r;
-            let paper = paper::find(corruption, &Row::SRRF)?.values[1];
+            let ours = summary.get(corruption, SeverityKey::Mean, &TableRow::SRRF)?.scores.rmse_r;
+            let paper = paper::find(corruption, &TableRow::SRRF)?.values[1];
             (ours > paper).then(|| format!("{corruption} ({ours:.2} against {paper:.2})"))
         })
         .collect();
@@ -40,13 +40,19 @@ pub(crate) fn losses(summary: &Summary) -> Vec<String> {
 }
 
 /// A sentence where another method is better than `ours`.
-fn against_others(summary: &Summary, quantity: &Quantity, corruption: &str, ours: &Row) -> Option<String> {
-    let value = |method: &Row| quantity.shown(&summary.get(corruption, SeverityKey::Mean, method)?.scores);
+fn against_others(
+    summary: &Summary,
+    quantity: &Quantity,
+    corruption: &str,
+    ours: &TableRow,
+) -> Option<String> {
+    let value =
+        |method: &TableRow| quantity.shown(&summary.get(corruption, SeverityKey::Mean, method)?.scores);
     let mine = value(ours)?;
     let printed = |v: f64| format!("{v:.*}", quantity.digits);
     let better =
         |v: f64| printed(v) != printed(mine) && if quantity.more_is_better { v > mine } else { v < mine };
-    let others = summary.methods().into_iter().filter(|m| **m != Row::Oracle && !is_ours(m));
+    let others = summary.methods().into_iter().filter(|m| **m != TableRow::Oracle && !is_ours(m));
     let ahead: Vec<String> = others
         .filter_map(|m| value(m).filter(|v| better(*v)).map(|v| format!("{m} ({})", printed(v))))
         .collect();
@@ -61,13 +67,14 @@ fn against_others(summary: &Summary, quantity: &Quantity, corruption: &str, ours
 
 /// Sentences where a branch beats the fusion, or refinement makes it worse.
 fn against_itself(summary: &Summary, quantity: &Quantity, corruption: &str) -> Vec<String> {
-    let value = |method: &Row| Some(summary.get(corruption, SeverityKey::Mean, method)?.scores.rmse_r);
+    let value = |method: &TableRow| Some(summary.get(corruption, SeverityKey::Mean, method)?.scores.rmse_r);
     let printed = |v: f64| format!("{v:.*}", quantity.digits);
-    let Some(fused) = value(&Row::SRRF) else { return Vec::new() };
+    let Some(fused) = value(&TableRow::SRRF) else { return Vec::new() };
     let mut found = Vec::new();
-    for (other, what) in
-        [(Row::SRRF_DENSE, "the dense branch alone"), (Row::SRRF_SKELETON, "the skeleton branch alone")]
-    {
+    for (other, what) in [
+        (TableRow::SRRF_DENSE, "the dense branch alone"),
+        (TableRow::SRRF_SKELETON, "the skeleton branch alone"),
+    ] {
         if let Some(v) = value(&other).filter(|v| *v < fused && printed(*v) != printed(fused)) {
             found.push(format!(
                 "{corruption}: {what} ({}) is ahead of the fusion ({}) in RMSE(R).",
@@ -76,7 +83,7 @@ fn against_itself(summary: &Summary, quantity: &Quantity, corruption: &str) -> V
             ));
         }
     }
-    if let Some(v) = value(&Row::SRRF_REFINE).filter(|v| *v > fused && printed(*v) != printed(fused)) {
+    if let Some(v) = value(&TableRow::SRRF_REFINE).filter(|v| *v > fused && printed(*v) != printed(fused)) {
         found.push(format!(
             "{corruption}: refinement raises RMSE(R) from {} to {}.",
             printed(fused),
@@ -95,23 +102,25 @@ mod tests {
     fn only_losses_are_listed() {
         // The second method of the made-up outcome has ten times the error of the first, but not on
         // clean pairs, where both are exact.
-        let named = |rows: [Row; 2]| {
+        let named = |rows: [TableRow; 2]| {
             let mut outcome = outcome();
             outcome.rows = rows.to_vec();
             losses(&Summary::of(&outcome).unwrap())
         };
-        let behind = named([Row::ICP, Row::SRRF]);
+        let behind = named([TableRow::ICP, TableRow::SRRF]);
         assert!(behind.iter().any(|l| l.starts_with("cutout: RMSE(R) of srrf is 18.26, behind icp (1.83)")));
         assert!(!behind.iter().any(|l| l.starts_with("clean")), "{behind:?}");
         assert!(behind.last().unwrap().contains("cutout (18.26 against 2.86)"));
-        assert!(named([Row::SRRF, Row::ICP]).is_empty());
-        let refined = named([Row::SRRF, Row::SRRF_REFINE]);
+        assert!(named([TableRow::SRRF, TableRow::ICP]).is_empty());
+        let refined = named([TableRow::SRRF, TableRow::SRRF_REFINE]);
         assert!(
             refined.iter().any(|l| l.contains("refinement raises RMSE(R) from 1.83 to 18.26")),
             "{refined:?}"
         );
         assert!(
-            named([Row::SRRF_DENSE, Row::SRRF]).iter().any(|l| l.contains("the dense branch alone (1.83)"))
+            named([TableRow::SRRF_DENSE, TableRow::SRRF])
+                .iter()
+                .any(|l| l.contains("the dense branch alone (1.83)"))
         );
     }
 }

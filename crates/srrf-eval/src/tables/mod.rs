@@ -19,17 +19,18 @@ pub use options::TablesOptions;
 
 use srrf_args::flags::Threads;
 
+use crate::answers::RunOutcome;
 use crate::cache::Cache;
-use crate::cli::weights_by_method;
+use crate::cli::shared::weights_by_method;
 use crate::method_set::{DefaultRows, MethodSet};
-use crate::methods::{Method, MethodContext, registry};
+use crate::methods::{MethodContext, ReadyMethod, registry};
 use crate::pairs::PairSource;
 use crate::protocol::{MIDDLE, Protocol, SynthesizedPairs};
 use crate::report::book;
 use crate::report::numbers::numbers;
-use crate::report::write::{self, Part};
-use crate::rows::Row;
-use crate::run::{Outcome, Run};
+use crate::report::write::{self, ReportPart};
+use crate::rows::TableRow;
+use crate::run::Run;
 use crate::summary::Summary;
 use crate::{EvalError, data, report};
 use sampling::SampledPairs;
@@ -38,7 +39,7 @@ use sampling::SampledPairs;
 const BUILT_IN_SHAPES: usize = 20;
 
 /// What [`make`] says while it works.
-pub enum Progress<'a> {
+pub enum TablesProgress<'a> {
     /// A line for the reader.
     Line(&'a str),
     /// An experiment begins: its title, its pairs.
@@ -48,17 +49,17 @@ pub enum Progress<'a> {
 }
 
 /// Where progress goes.
-type Listener<'a> = &'a mut (dyn FnMut(Progress<'_>) + Send);
+type Listener<'a> = &'a mut (dyn FnMut(TablesProgress<'_>) + Send);
 
 /// A scored experiment.
 struct Measured {
-    outcome: Outcome,
+    outcome: RunOutcome,
     summary: Summary,
     data: String,
 }
 
 /// Everything that was measured, by part of the report.
-struct Evidence {
+struct TablesEvidence {
     parts: BTreeMap<&'static str, Measured>,
     /// Networks that were trained otherwise, by name.
     variants: Vec<(String, Measured)>,
@@ -70,7 +71,7 @@ struct Evidence {
     shapes: usize,
 }
 
-impl Evidence {
+impl TablesEvidence {
     /// All severities on the same shapes, which ablations are compared with: the main tables, where each of
     /// their shapes is shown at every severity.
     fn same_shapes(&self, options: &TablesOptions) -> Option<&Measured> {
@@ -90,13 +91,13 @@ pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, E
     options.book.as_deref().map_or(Ok(()), report::prepare)?;
     let cache = Cache::open(&options.cache_folder(), &options.device)?;
     for (name, reason) in &methods.left_out {
-        say(Progress::Line(&format!("left out: {name}: {reason}")));
+        say(TablesProgress::Line(&format!("left out: {name}: {reason}")));
     }
     let shapes = match options.shapes {
         Some(shapes) => shapes,
         None => data::open(options.data.as_deref(), BUILT_IN_SHAPES)?.len(),
     };
-    let stage = Stage { options, cache: &cache, shapes };
+    let stage = TablesRun { options, cache: &cache, shapes };
     let mut parts = BTreeMap::new();
     for experiment in plan::experiments(options, shapes, &methods) {
         let pairs = stage.pairs(experiment.protocol)?;
@@ -105,7 +106,7 @@ pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, E
     }
     let weights = methods.weights();
     let mut evidence =
-        Evidence { parts, variants: Vec::new(), methods, weights, missing: Vec::new(), shapes };
+        TablesEvidence { parts, variants: Vec::new(), methods, weights, missing: Vec::new(), shapes };
     if evidence.same_shapes(options).is_none() {
         let parts = plan::COMPARED.into_iter().filter(|part| evidence.parts.contains_key(part));
         let compared = parts.chain(options.variant.iter().map(|(name, _)| name.as_str()));
@@ -117,13 +118,13 @@ pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, E
     stage.variants(&mut evidence, say)?;
     stage.thresholds(&mut evidence, &context, say)?;
     stage.samples(&mut evidence, say)?;
-    say(Progress::Line(&format!("{} answers were taken from the cache", cache.reused())));
+    say(TablesProgress::Line(&format!("{} answers were taken from the cache", cache.reused())));
     let document = sections::document(options, &stage, &evidence, &context)?;
     let parts = evidence.parts.iter().map(|(part, measured)| (*part, measured));
     let variants = evidence.variants.iter().map(|(name, measured)| (name.as_str(), measured));
-    let parts: Vec<Part<'_>> = parts
+    let parts: Vec<ReportPart<'_>> = parts
         .chain(variants)
-        .map(|(part, measured)| Part { part, data: &measured.data, summary: &measured.summary })
+        .map(|(part, measured)| ReportPart { part, data: &measured.data, summary: &measured.summary })
         .collect();
     let mut written = write::all(&options.out, &document, &parts)?;
     if let Some(folder) = &options.book {
@@ -136,13 +137,13 @@ pub fn make(options: &TablesOptions, say: Listener<'_>) -> Result<Vec<String>, E
 }
 
 /// What all experiments share.
-struct Stage<'a> {
+struct TablesRun<'a> {
     options: &'a TablesOptions,
     cache: &'a Cache,
     shapes: usize,
 }
 
-impl Stage<'_> {
+impl TablesRun<'_> {
     /// The protocol of ablations at one severity.
     fn middle(&self) -> Protocol {
         let same = plan::same_shapes_protocol(self.options, self.shapes);
@@ -158,19 +159,19 @@ impl Stage<'_> {
         &self,
         title: &str,
         pairs: &dyn PairSource,
-        methods: &[Method],
-        rows: Vec<Row>,
+        methods: &[ReadyMethod],
+        rows: Vec<TableRow>,
         say: Listener<'_>,
     ) -> Result<Measured, EvalError> {
-        say(Progress::Start(title, pairs.groups().iter().map(|g| g.pairs).sum()));
+        say(TablesProgress::Start(title, pairs.groups().iter().map(|g| g.pairs).sum()));
         let threads = Threads { threads: self.options.threads }.count();
         let run = Run { pairs, methods, transforms: Vec::new(), rows, threads, cache: Some(self.cache) };
-        let outcome = run.execute(&mut |done, group| say(Progress::Done(done, group)))?;
+        let outcome = run.execute(&mut |done, group| say(TablesProgress::Done(done, group)))?;
         Ok(Measured { summary: Summary::of(&outcome)?, outcome, data: pairs.description() })
     }
 
     /// The models of the other tables: trained clean, and the network trained without the loss.
-    fn other_weights(&self, evidence: &mut Evidence, say: Listener<'_>) -> Result<(), EvalError> {
+    fn other_weights(&self, evidence: &mut TablesEvidence, say: Listener<'_>) -> Result<(), EvalError> {
         let options = self.options;
         let main = plan::main_protocol(options, self.shapes);
         let middle = self.middle();
@@ -192,7 +193,7 @@ impl Stage<'_> {
                 continue;
             }
             let entries = registry().iter().filter(|m| weights.contains_key(m.name));
-            let rows: Vec<Row> = entries.flat_map(|m| m.rows()).collect();
+            let rows: Vec<TableRow> = entries.flat_map(|m| m.rows()).collect();
             let context = MethodContext { weights, device: options.device.clone() };
             let set = MethodSet::of_rows(&rows, false, &context)?;
             let measured = self.score(title, &self.pairs(protocol)?, &set.methods, set.rows.clone(), say)?;
@@ -204,10 +205,10 @@ impl Stage<'_> {
     }
 
     /// The networks of `--variant`.
-    fn variants(&self, evidence: &mut Evidence, say: Listener<'_>) -> Result<(), EvalError> {
+    fn variants(&self, evidence: &mut TablesEvidence, say: Listener<'_>) -> Result<(), EvalError> {
         for (name, weights) in &self.options.variant {
             let context = MethodContext::of_srrf(Some(weights.clone()), &self.options.device);
-            let set = MethodSet::of_rows(&Row::NETWORK, false, &context)?;
+            let set = MethodSet::of_rows(&TableRow::NETWORK, false, &context)?;
             let pairs = self.pairs(self.middle())?;
             let measured = self.score(name, &pairs, &set.methods, set.rows.clone(), say)?;
             evidence.weights.extend(set.weights().into_values().map(|w| (name.clone(), w)));
@@ -219,32 +220,32 @@ impl Stage<'_> {
     /// The variants of the integration.
     fn thresholds(
         &self,
-        evidence: &mut Evidence,
+        evidence: &mut TablesEvidence,
         context: &MethodContext,
         say: Listener<'_>,
     ) -> Result<(), EvalError> {
-        if !self.options.wants("thresholds") || evidence.methods.method(&Row::SRRF).is_none() {
+        if !self.options.wants("thresholds") || evidence.methods.method(&TableRow::SRRF).is_none() {
             return Ok(());
         }
         let methods = thresholds::methods(context)?;
         let protocol =
             Protocol { clean: false, corruptions: thresholds::CORRUPTIONS.to_vec(), ..self.middle() };
-        let rows = methods.iter().flat_map(Method::rows).collect();
+        let rows = methods.iter().flat_map(ReadyMethod::rows).collect();
         let measured = self.score("inlier thresholds", &self.pairs(protocol)?, &methods, rows, say)?;
         evidence.parts.insert("thresholds", measured);
         Ok(())
     }
 
     /// Table 4.
-    fn samples(&self, evidence: &mut Evidence, say: Listener<'_>) -> Result<(), EvalError> {
+    fn samples(&self, evidence: &mut TablesEvidence, say: Listener<'_>) -> Result<(), EvalError> {
         if !self.options.wants("table4") {
             return Ok(());
         }
         let rows = evidence.methods.only(&sections::SAMPLED_ROWS);
-        let Some(network) = evidence.methods.method(&Row::SRRF).filter(|_| !rows.is_empty()) else {
+        let Some(network) = evidence.methods.method(&TableRow::SRRF).filter(|_| !rows.is_empty()) else {
             return Ok(());
         };
-        if !rows.contains(&Row::DCP) {
+        if !rows.contains(&TableRow::DCP) {
             let reason = "DCP has no weights here; other methods stand in".to_owned();
             evidence.missing.push(("DCP in table 4".to_owned(), reason));
         }

@@ -8,7 +8,7 @@ use srrf_args::flags::{MOST_POINTS, MOST_SHAPES, MOST_THREADS, help, value};
 use srrf_args::numbers::{entry, whole};
 use srrf_model::embedded;
 
-use crate::cli::{OF_BASELINES, TEST_SPLIT, weights_by_method};
+use crate::cli::shared::{OF_BASELINES, TEST_SPLIT, weights_by_method};
 
 /// Makes all tables and figures of the report: the paper's tables 1 to 5 with its own numbers beside
 /// ours, the ablations that need no training, severity curves, and one page to look at it all.

@@ -5,18 +5,18 @@ use srrf_corrupt::{Corrupt, CorruptionKind, Mixture, PairConfig, Sampling, Sever
 use super::options::TablesOptions;
 use crate::method_set::MethodSet;
 use crate::protocol::{MIDDLE, Protocol};
-use crate::rows::Row;
+use crate::rows::TableRow;
 
 /// Rows of the ablations that compare protocols.
-const ABLATION_ROWS: [Row; 8] = [
-    Row::ICP,
-    Row::FPFH_RANSAC,
-    Row::Oracle,
-    Row::SRRF_DENSE,
-    Row::SRRF_SKELETON,
-    Row::SRRF,
-    Row::SRRF_REFINE,
-    Row::SRRF_REGISTER,
+const ABLATION_ROWS: [TableRow; 8] = [
+    TableRow::ICP,
+    TableRow::FPFH_RANSAC,
+    TableRow::Oracle,
+    TableRow::SRRF_DENSE,
+    TableRow::SRRF_SKELETON,
+    TableRow::SRRF,
+    TableRow::SRRF_REFINE,
+    TableRow::SRRF_REGISTER,
 ];
 
 /// Share of each cloud that the crop of partial overlap keeps, as in RPMNet's tables.
@@ -52,7 +52,7 @@ pub(crate) struct Experiment {
     /// Its pairs.
     pub protocol: Protocol,
     /// Its rows.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
 }
 
 /// The protocol of the main tables.
@@ -84,7 +84,7 @@ pub(crate) fn experiments(options: &TablesOptions, shapes: usize, methods: &Meth
     // Every point is copied at severity 5 already.
     let extendable = CorruptionKind::ALL.into_iter().filter(|k| *k != CorruptionKind::Upsampling);
     let rows = || methods.only(&ABLATION_ROWS);
-    let without_oracle = rows().into_iter().filter(|row| *row != Row::Oracle).collect();
+    let without_oracle = rows().into_iter().filter(|row| *row != TableRow::Oracle).collect();
     let all = [
         Experiment {
             key: "main",

@@ -4,13 +4,13 @@ use rand::seq::index;
 use srrf_cloud::{PointCloud, Register, farthest_point_sampling};
 use srrf_corrupt::{Pair, Purpose, Stream};
 
-use crate::EvalError;
 use crate::pairs::{EvalPair, Group, PairSource};
 use crate::protocol::SynthesizedPairs;
+use crate::{EvalError, PairFault};
 
 /// How the points of the pairs of a group are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Choice {
+enum PointChoice {
     Original,
     Random,
     Farthest,
@@ -18,14 +18,14 @@ enum Choice {
 }
 
 /// The ways to choose, and whether the target has the source's points, posed, instead of its own.
-const GROUPS: [(&str, Choice, bool); 7] = [
-    ("original", Choice::Original, false),
-    ("random, corresponding", Choice::Random, true),
-    ("random, independent", Choice::Random, false),
-    ("farthest, corresponding", Choice::Farthest, true),
-    ("farthest, independent", Choice::Farthest, false),
-    ("skeleton, corresponding", Choice::Skeleton, true),
-    ("skeleton, independent", Choice::Skeleton, false),
+const GROUPS: [(&str, PointChoice, bool); 7] = [
+    ("original", PointChoice::Original, false),
+    ("random, corresponding", PointChoice::Random, true),
+    ("random, independent", PointChoice::Random, false),
+    ("farthest, corresponding", PointChoice::Farthest, true),
+    ("farthest, independent", PointChoice::Farthest, false),
+    ("skeleton, corresponding", PointChoice::Skeleton, true),
+    ("skeleton, independent", PointChoice::Skeleton, false),
 ];
 
 /// Clean pairs reduced to few points: those of the paper's table 4 in each reading. Corresponding
@@ -52,11 +52,11 @@ impl<'a> SampledPairs<'a> {
     }
 
     /// The chosen points of both clouds of a pair.
-    fn chosen(&self, choice: Choice, item: usize, pair: &Pair) -> Result<[Vec<[f64; 3]>; 2], String> {
+    fn chosen(&self, choice: PointChoice, item: usize, pair: &Pair) -> Result<[Vec<[f64; 3]>; 2], PairFault> {
         let clouds = [&pair.source, &pair.target];
         match choice {
-            Choice::Original => Ok(clouds.map(|c| c.points().to_vec())),
-            Choice::Random => {
+            PointChoice::Original => Ok(clouds.map(|c| c.points().to_vec())),
+            PointChoice::Random => {
                 let stream = Stream { seed: self.seed, item: item as u64 };
                 let mut rng = stream.rng(Purpose::Choice);
                 Ok(clouds.map(|cloud| {
@@ -64,13 +64,13 @@ impl<'a> SampledPairs<'a> {
                     chosen.iter().map(|i| cloud.points()[i]).collect()
                 }))
             }
-            Choice::Farthest => Ok(clouds.map(|cloud| {
+            PointChoice::Farthest => Ok(clouds.map(|cloud| {
                 let chosen = farthest_point_sampling(cloud.points(), self.count, 0);
                 chosen.into_iter().map(|i| cloud.points()[i]).collect()
             })),
-            Choice::Skeleton => {
-                let found = self.skeletons.register(&pair.source, &pair.target).map_err(|e| e.to_string())?;
-                let skeletons = found.skeletons.ok_or("the method makes no skeletons")?;
+            PointChoice::Skeleton => {
+                let found = self.skeletons.register(&pair.source, &pair.target)?;
+                let skeletons = found.skeletons.ok_or(PairFault::NoSkeletons)?;
                 Ok([skeletons.source.points, skeletons.target.points])
             }
         }
@@ -93,13 +93,13 @@ impl PairSource for SampledPairs<'_> {
     fn pair(&self, group: usize, item: usize) -> Result<EvalPair, EvalError> {
         let EvalPair { mut pair, clean } = self.clean.pair(0, item)?;
         let (name, choice, corresponding) = GROUPS[group];
-        let failed = |problem: String| EvalError::Pair { group: name.to_owned(), item, problem };
+        let failed = |source: PairFault| EvalError::Pair { group: name.to_owned(), item, source };
         let [source, mut target] = self.chosen(choice, item, &pair).map_err(failed)?;
         if corresponding {
             target = source.iter().map(|p| pair.target_from_source.apply(p)).collect();
         }
-        pair.source = PointCloud::new(source).map_err(|e| failed(e.to_string()))?;
-        pair.target = PointCloud::new(target).map_err(|e| failed(e.to_string()))?;
+        pair.source = PointCloud::new(source).map_err(|e| failed(e.into()))?;
+        pair.target = PointCloud::new(target).map_err(|e| failed(e.into()))?;
         (pair.source_origin, pair.target_origin) = (None, None);
         Ok(EvalPair { pair, clean })
     }
@@ -155,9 +155,9 @@ mod tests {
         for (group, (name, choice, corresponding)) in GROUPS.into_iter().enumerate() {
             let found = pairs.pair(group, 1).unwrap().pair;
             let expected = match choice {
-                Choice::Original => 67,
-                Choice::Random | Choice::Farthest => 13,
-                Choice::Skeleton => 5,
+                PointChoice::Original => 67,
+                PointChoice::Random | PointChoice::Farthest => 13,
+                PointChoice::Skeleton => 5,
             };
             assert_eq!((found.source.len(), found.target.len()), (expected, expected), "{name}");
             let moved = found.source.transformed(&found.target_from_source);

@@ -6,30 +6,31 @@ use srrf_cloud::{PointCloud, Register};
 use srrf_corrupt::Pair;
 
 use super::options::TablesOptions;
-use super::{Evidence, Measured, Stage, chosen, losses, plan, thresholds};
+use super::{Measured, TablesEvidence, TablesRun, chosen, losses, plan, thresholds};
 use crate::EvalError;
 use crate::method_set::MethodSet;
 use crate::methods::MethodContext;
 use crate::pairs::PairSource;
 use crate::protocol::{MIDDLE, SynthesizedPairs};
-use crate::report::document::{Document, Figure, Section};
+use crate::report::document::{Document, Picture, Section};
 use crate::report::figures;
 use crate::report::sheet::Sheet;
 use crate::report::sheets::{self, Column};
-use crate::rows::Row;
+use crate::rows::TableRow;
 use crate::summary::SeverityKey;
 
 /// Rows of table 4: DCP, or what stands in for it.
-pub(super) static SAMPLED_ROWS: [Row; 4] = [Row::ICP, Row::DCP, Row::SRRF_DENSE, Row::SRRF];
+pub(super) static SAMPLED_ROWS: [TableRow; 4] =
+    [TableRow::ICP, TableRow::DCP, TableRow::SRRF_DENSE, TableRow::SRRF];
 
 /// Rows of the picture of registrations.
-const DRAWN_ROWS: [Row; 3] = [Row::ICP, Row::SRRF, Row::SRRF_REFINE];
+const DRAWN_ROWS: [TableRow; 3] = [TableRow::ICP, TableRow::SRRF, TableRow::SRRF_REFINE];
 
 /// Puts the report together.
 pub(super) fn document(
     options: &TablesOptions,
-    stage: &Stage<'_>,
-    evidence: &Evidence,
+    stage: &TablesRun<'_>,
+    evidence: &TablesEvidence,
     context: &MethodContext,
 ) -> Result<Document, EvalError> {
     let mut sections = Vec::new();
@@ -75,7 +76,7 @@ pub(super) fn document(
 }
 
 /// Where the numbers come from. Nothing here differs between two runs of the same command.
-fn facts(options: &TablesOptions, evidence: &Evidence) -> Vec<(String, String)> {
+fn facts(options: &TablesOptions, evidence: &TablesEvidence) -> Vec<(String, String)> {
     let mut facts = Vec::new();
     let mut fact = |name: &str, value: String| facts.push((name.to_owned(), value));
     if let Some(measured) = evidence.parts.get("main").or_else(|| evidence.parts.values().next()) {
@@ -99,11 +100,11 @@ fn facts(options: &TablesOptions, evidence: &Evidence) -> Vec<(String, String)> 
 }
 
 /// Sum of the times of all answers; branches of one answer count once.
-fn seconds(evidence: &Evidence) -> f64 {
+fn seconds(evidence: &TablesEvidence) -> f64 {
     let of = |measured: &Measured| -> f64 {
         let rows = &measured.outcome.rows;
-        let whole = |row: &Row| {
-            rows.iter().any(|r| matches!((r, row), (Row::Method(a), Row::Branch(b, _)) if a == b))
+        let whole = |row: &TableRow| {
+            rows.iter().any(|r| matches!((r, row), (TableRow::Method(a), TableRow::Branch(b, _)) if a == b))
         };
         let counted: Vec<usize> = (0..rows.len()).filter(|&i| !whole(&rows[i])).collect();
         let answers = measured.outcome.records.iter().flat_map(|r| counted.iter().map(|&i| &r.answers[i]));
@@ -160,8 +161,8 @@ fn severity_section(same: &Measured) -> Result<Section, EvalError> {
 
 /// Corruptions, registrations, weights and samplings.
 fn pictures(
-    stage: &Stage<'_>,
-    evidence: &Evidence,
+    stage: &TablesRun<'_>,
+    evidence: &TablesEvidence,
     pairs: &SynthesizedPairs,
     main: &Measured,
     context: &MethodContext,
@@ -170,7 +171,7 @@ fn pictures(
     let same = stage.pairs(plan::same_shapes_protocol(stage.options, stage.shapes))?;
     section.figures.extend(figures::corruption_sheet(&same, same.groups()[0].pairs / 3)?);
     section.figures.extend(figures::registrations(pairs, &main.outcome, &DRAWN_ROWS)?);
-    if evidence.methods.method(&Row::SRRF).is_some() {
+    if evidence.methods.method(&TableRow::SRRF).is_some() {
         let shown = |count: usize| {
             let count = count.min(main.outcome.groups[0].pairs);
             let items = (0..count).map(|i| i * main.outcome.groups[0].pairs / count);
@@ -190,21 +191,21 @@ fn pictures(
 /// Skeletons of pairs of several corruptions, by the network and, where there is one, by the network
 /// that was trained without the loss.
 fn skeleton_picture(
-    stage: &Stage<'_>,
-    evidence: &Evidence,
+    stage: &TablesRun<'_>,
+    evidence: &TablesEvidence,
     pairs: &SynthesizedPairs,
     main: &Measured,
-) -> Result<Option<Figure>, EvalError> {
+) -> Result<Option<Picture>, EvalError> {
     let network = |weights: Option<PathBuf>| -> Result<Option<MethodSet>, EvalError> {
         let context = |weights| MethodContext::of_srrf(Some(weights), &stage.options.device);
-        weights.map(|weights| MethodSet::of_rows(&[Row::SRRF], false, &context(weights))).transpose()
+        weights.map(|weights| MethodSet::of_rows(&[TableRow::SRRF], false, &context(weights))).transpose()
     };
     let (with, without) = (network(stage.options.with_loss())?, network(stage.options.without_loss())?);
     let mut networks: Vec<(&str, &dyn Register)> = Vec::new();
-    if let Some(method) = without.as_ref().and_then(|set| set.method(&Row::SRRF)) {
+    if let Some(method) = without.as_ref().and_then(|set| set.method(&TableRow::SRRF)) {
         networks.push(("without the loss", &*method.register));
     }
-    let with = with.as_ref().unwrap_or(&evidence.methods).method(&Row::SRRF);
+    let with = with.as_ref().unwrap_or(&evidence.methods).method(&TableRow::SRRF);
     let Some(method) = with else { return Ok(None) };
     networks.push(("with the loss", &*method.register));
     let mut shown: Vec<(String, Pair)> = Vec::new();
@@ -217,19 +218,19 @@ fn skeleton_picture(
     Ok(figures::agreement(&networks, &shown))
 }
 
-fn views(evidence: &Evidence, pairs: &SynthesizedPairs, main: &Measured) -> Result<Section, EvalError> {
+fn views(evidence: &TablesEvidence, pairs: &SynthesizedPairs, main: &Measured) -> Result<Section, EvalError> {
     let mut section = Section::new("pairs", "Chosen pairs in 3D");
     section.text.push(
         "A typical pair of each corruption at severity 3 (median error of srrf among shapes without an axis of \
          symmetry) and three of the worst. Choose a pair and a pose; drag to turn."
             .into(),
     );
-    let network = evidence.methods.method(&Row::SRRF).map(|m| &*m.register as &dyn Register);
+    let network = evidence.methods.method(&TableRow::SRRF).map(|m| &*m.register as &dyn Register);
     section.html = chosen::viewer(pairs, &main.outcome, network)?;
     Ok(section)
 }
 
-fn sampling_section(stage: &Stage<'_>, evidence: &Evidence) -> Result<Section, EvalError> {
+fn sampling_section(stage: &TablesRun<'_>, evidence: &TablesEvidence) -> Result<Section, EvalError> {
     let mut section = Section::new("table4", "Table 4: few points, chosen in three ways");
     let Some(measured) = evidence.parts.get("table4") else { return Ok(section) };
     section.text.push(format!("{}.", measured.data));
@@ -243,14 +244,14 @@ fn sampling_section(stage: &Stage<'_>, evidence: &Evidence) -> Result<Section, E
         &measured.summary,
     ));
     let row = SAMPLED_ROWS.iter().rev().find(|r| measured.outcome.rows.contains(r));
-    if let (Some(row), Some(method)) = (row, evidence.methods.method(&Row::SRRF)) {
+    if let (Some(row), Some(method)) = (row, evidence.methods.method(&TableRow::SRRF)) {
         let pairs = stage.sampled(&*method.register)?;
         section.figures.extend(figures::sampled_registrations(&pairs, &measured.outcome, row, 0)?);
     }
     Ok(section)
 }
 
-fn skeleton_section(evidence: &Evidence, same: Option<&Measured>) -> Section {
+fn skeleton_section(evidence: &TablesEvidence, same: Option<&Measured>) -> Section {
     let mut section = Section::new("table5", "Table 5: skeletons");
     let of = |part: &str| evidence.parts.get(part).map(|m| &m.summary);
     if let Some(with) = of("with-loss").or(same.map(|m| &m.summary)) {
@@ -259,7 +260,7 @@ fn skeleton_section(evidence: &Evidence, same: Option<&Measured>) -> Section {
     section
 }
 
-fn ablations(evidence: &Evidence, same: Option<&Measured>) -> Section {
+fn ablations(evidence: &TablesEvidence, same: Option<&Measured>) -> Section {
     let mut section = Section::new("ablations", "Ablations");
     section.text.push(
         "Dense branch, skeleton branch and fusion are rows of every table. The number of skeleton points is fixed by \

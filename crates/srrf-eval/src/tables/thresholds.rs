@@ -5,7 +5,7 @@ use srrf_corrupt::CorruptionKind;
 use srrf_model::{InlierTest, IntegrationConfig, SrrfRegister};
 
 use crate::EvalError;
-use crate::methods::{Method, MethodContext, SetupError, network};
+use crate::methods::{MethodContext, ReadyMethod, SetupError, network};
 
 /// The corruptions that are scored: two of density, two of noise, one of shape.
 pub(crate) const CORRUPTIONS: [CorruptionKind; 5] = [
@@ -55,7 +55,7 @@ impl Register for Named {
 ///
 /// # Errors
 /// [`EvalError::Setup`] where the weights cannot be had.
-pub(crate) fn methods(context: &MethodContext) -> Result<Vec<Method>, EvalError> {
+pub(crate) fn methods(context: &MethodContext) -> Result<Vec<ReadyMethod>, EvalError> {
     let set_up = |&(name, test, [dense, skeleton], sharpness): &Variant| {
         let (mut loaded, weights) = network(context)?;
         loaded.config.integration = IntegrationConfig {
@@ -67,10 +67,10 @@ pub(crate) fn methods(context: &MethodContext) -> Result<Vec<Method>, EvalError>
             standard_errors: None,
         };
         let inner = SrrfRegister::new(loaded, srrf_model::device(&context.device)?);
-        Ok(Method {
+        Ok(ReadyMethod {
             weights: Some(weights),
             settings: format!("{test:?}, thresholds {dense} and {skeleton}, sharpness {sharpness}"),
-            ..Method::new(Named { inner, name })
+            ..ReadyMethod::new(Named { inner, name })
         })
     };
     let named = |source: SetupError| EvalError::Setup { name: "srrf", source };

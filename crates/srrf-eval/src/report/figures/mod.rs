@@ -10,12 +10,12 @@ use srrf_cloud::Rigid;
 use srrf_corrupt::Severity;
 
 use crate::EvalError;
+use crate::answers::RunOutcome;
 use crate::pairs::PairSource;
 use crate::quantities::QUANTITIES;
 use crate::report::curves;
-use crate::report::document::Figure;
-use crate::rows::Row;
-use crate::run::Outcome;
+use crate::report::document::Picture;
+use crate::rows::TableRow;
 use crate::summary::Summary;
 
 /// Points drawn of each cloud.
@@ -25,29 +25,30 @@ const DRAWN: usize = 220;
 const MOST_CURVES: usize = 8;
 
 /// Rows that curves show, the most important first.
-const CURVES: [Row; 13] = [
-    Row::Oracle,
-    Row::ICP,
-    Row::SRRF,
-    Row::SRRF_REFINE,
-    Row::SRRF_REGISTER,
-    Row::RGM,
-    Row::DCP,
-    Row::FPFH_RANSAC,
-    Row::method("panet"),
-    Row::method("equi-gspr"),
-    Row::method("pointnetlk"),
-    Row::SRRF_DENSE,
-    Row::SRRF_SKELETON,
+const CURVES: [TableRow; 13] = [
+    TableRow::Oracle,
+    TableRow::ICP,
+    TableRow::SRRF,
+    TableRow::SRRF_REFINE,
+    TableRow::SRRF_REGISTER,
+    TableRow::RGM,
+    TableRow::DCP,
+    TableRow::FPFH_RANSAC,
+    TableRow::method("panet"),
+    TableRow::method("equi-gspr"),
+    TableRow::method("pointnetlk"),
+    TableRow::SRRF_DENSE,
+    TableRow::SRRF_SKELETON,
 ];
 
 /// Error against severity, one picture for each principal quantity.
 ///
 /// # Errors
 /// [`EvalError::Picture`] with the drawing library's reason.
-pub(crate) fn severity_curves(summary: &Summary) -> Result<Vec<Figure>, EvalError> {
+pub(crate) fn severity_curves(summary: &Summary) -> Result<Vec<Picture>, EvalError> {
     let methods = summary.methods();
-    let shown: Vec<Row> = CURVES.into_iter().filter(|m| methods.contains(&m)).take(MOST_CURVES).collect();
+    let shown: Vec<TableRow> =
+        CURVES.into_iter().filter(|m| methods.contains(&m)).take(MOST_CURVES).collect();
     let mut summary = summary.clone();
     summary.rows.retain(|row| shown.contains(&row.method));
     let mut figures = Vec::new();
@@ -56,7 +57,7 @@ pub(crate) fn severity_curves(summary: &Summary) -> Result<Vec<Figure>, EvalErro
         let svg = curves::svg(quantity, &summary)
             .map_err(|problem| EvalError::Picture { path: file.clone().into(), problem })?;
         let caption = format!("{} against severity", quantity.title);
-        figures.extend(svg.map(|svg| Figure { file, caption, svg }));
+        figures.extend(svg.map(|svg| Picture { file, caption, svg }));
     }
     Ok(figures)
 }
@@ -65,7 +66,7 @@ pub(crate) fn severity_curves(summary: &Summary) -> Result<Vec<Figure>, EvalErro
 ///
 /// # Errors
 /// [`EvalError`] where a pair cannot be made.
-pub(crate) fn corruption_sheet(pairs: &dyn PairSource, item: usize) -> Result<Option<Figure>, EvalError> {
+pub(crate) fn corruption_sheet(pairs: &dyn PairSource, item: usize) -> Result<Option<Picture>, EvalError> {
     let shown = [Severity::ALL[0], Severity::ALL[2], Severity::ALL[4]].map(Severity::get);
     let groups = pairs.groups();
     let clean = pairs.pair(0, item)?.pair;
@@ -90,7 +91,7 @@ pub(crate) fn corruption_sheet(pairs: &dyn PairSource, item: usize) -> Result<Op
         grid.panel(column, row, &format!("{}, s = {}", groups[index].corruption, groups[index].severity));
         grid.dots(&view, &thinned(pair.source.points(), 2 * DRAWN), BLUE, 1.4);
     }
-    Ok(Some(Figure {
+    Ok(Some(Picture {
         file: "corruptions.svg".into(),
         caption: format!("The corruptions at severities 1, 3 and 5 on {} (figures 2 to 4)", clean.id),
         svg: grid.svg(),
@@ -103,9 +104,9 @@ pub(crate) fn corruption_sheet(pairs: &dyn PairSource, item: usize) -> Result<Op
 /// [`EvalError`] where a pair cannot be made.
 pub(crate) fn registrations(
     pairs: &dyn PairSource,
-    outcome: &Outcome,
-    shown: &[Row],
-) -> Result<Option<Figure>, EvalError> {
+    outcome: &RunOutcome,
+    shown: &[TableRow],
+) -> Result<Option<Picture>, EvalError> {
     let rows: Vec<usize> = shown.iter().filter_map(|s| outcome.rows.iter().position(|r| r == s)).collect();
     let groups: Vec<usize> =
         (0..outcome.groups.len()).filter(|&g| [0, 3].contains(&outcome.groups[g].severity)).collect();
@@ -141,12 +142,12 @@ pub(crate) fn registrations(
             panel(&mut grid, [left + 1 + at, row], &view, &pair, &pose, &title);
         }
     }
-    Ok(Some(Figure {
+    Ok(Some(Picture {
         file: "registrations.svg".into(),
         caption: format!(
             "A pair of each corruption at severity 3, as given and as {} left it: source blue, target green, moved \
              source red; the angle is the rotation error",
-            shown.iter().map(Row::to_string).collect::<Vec<_>>().join(", ")
+            shown.iter().map(TableRow::to_string).collect::<Vec<_>>().join(", ")
         ),
         svg: grid.svg(),
     }))
@@ -173,10 +174,10 @@ fn panel(
 /// [`EvalError`] where a pair cannot be made.
 pub(crate) fn sampled_registrations(
     pairs: &dyn PairSource,
-    outcome: &Outcome,
-    row: &Row,
+    outcome: &RunOutcome,
+    row: &TableRow,
     item: usize,
-) -> Result<Option<Figure>, EvalError> {
+) -> Result<Option<Picture>, EvalError> {
     let Some(method) = outcome.rows.iter().position(|r| r == row) else { return Ok(None) };
     let mut grid = Grid::new(4, outcome.groups.len().div_ceil(4));
     for (group, named) in outcome.groups.iter().enumerate() {
@@ -191,7 +192,7 @@ pub(crate) fn sampled_registrations(
         grid.dots(&view, &thinned(pair.target.points(), DRAWN), GREEN, 2.6);
         grid.dots(&view, &thinned(pair.source.transformed(&pose).points(), DRAWN), RED, 1.6);
     }
-    Ok(Some(Figure {
+    Ok(Some(Picture {
         file: "sampled-registrations.svg".into(),
         caption: format!(
             "{row} on samples (figure 9): source blue, target green, source under the pose found red"
@@ -228,7 +229,7 @@ mod tests {
             pairs: &pairs,
             methods: &[],
             transforms: vec![],
-            rows: vec![Row::Oracle],
+            rows: vec![TableRow::Oracle],
             threads: 1,
             cache: None,
         };
@@ -237,10 +238,10 @@ mod tests {
         let sheet = corruption_sheet(&pairs, 1).unwrap().unwrap();
         assert_eq!(sheet.svg.matches("<path").count(), 6);
         // Clean and two corruptions, as given and by the oracle; two clouds each.
-        let drawn = registrations(&pairs, &outcome, &[Row::Oracle, Row::DCP]).unwrap().unwrap();
+        let drawn = registrations(&pairs, &outcome, &[TableRow::Oracle, TableRow::DCP]).unwrap().unwrap();
         assert_eq!(drawn.svg.matches("<path").count(), 3 * 2 * 2);
         assert!(drawn.svg.contains("oracle: 0.0 deg"), "exact on clean pairs");
-        assert!(registrations(&pairs, &outcome, &[Row::DCP]).unwrap().is_none());
+        assert!(registrations(&pairs, &outcome, &[TableRow::DCP]).unwrap().is_none());
         let curves = severity_curves(&Summary::of(&outcome).unwrap()).unwrap();
         assert_eq!(curves[0].file, "severity-rmse-r.svg");
     }

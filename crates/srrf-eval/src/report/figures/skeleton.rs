@@ -10,7 +10,7 @@ use srrf_model::weights::LoadedModel;
 use super::canvas::{BLUE, GREEN, GREY, Grid, RED, View, thinned};
 use crate::EvalError;
 use crate::methods::{MethodContext, SetupError, network};
-use crate::report::document::Figure;
+use crate::report::document::Picture;
 
 /// Colours of the skeleton points whose weights are shown.
 const WEIGHED: [&str; 5] = [RED, BLUE, "#cc79a7", "#e69f00", GREEN];
@@ -50,7 +50,7 @@ fn extract(context: &MethodContext, cloud: &PointCloud) -> Result<Extracted, Eva
 ///
 /// # Errors
 /// [`EvalError::Setup`] where the network cannot be had.
-pub(crate) fn weights(context: &MethodContext, clouds: &[&PointCloud]) -> Result<Figure, EvalError> {
+pub(crate) fn weights(context: &MethodContext, clouds: &[&PointCloud]) -> Result<Picture, EvalError> {
     let mut grid = Grid::new(2 * clouds.len(), 1);
     for (place, cloud) in clouds.iter().enumerate() {
         let found = extract(context, cloud)?;
@@ -77,7 +77,7 @@ pub(crate) fn weights(context: &MethodContext, clouds: &[&PointCloud]) -> Result
             grid.dots(&view, &[found.points[skeleton]], colour, 6.0);
         }
     }
-    Ok(Figure {
+    Ok(Picture {
         file: "skeleton-weights.svg".into(),
         caption: format!(
             "Skeleton points as convex combinations of sampled points (figure 6): lines lead to every sample whose \
@@ -96,7 +96,7 @@ pub(crate) fn samplings(
     context: &MethodContext,
     clouds: &[&PointCloud],
     seed: u64,
-) -> Result<Figure, EvalError> {
+) -> Result<Picture, EvalError> {
     let mut grid = Grid::new(3, clouds.len());
     for (row, cloud) in clouds.iter().enumerate() {
         let found = extract(context, cloud)?;
@@ -119,7 +119,7 @@ pub(crate) fn samplings(
             grid.dots(&view, chosen, RED, 3.5);
         }
     }
-    Ok(Figure {
+    Ok(Picture {
         file: "samplings.svg".into(),
         caption:
             "Three ways to choose few points (figure 8); circles have the radii of the skeleton's spheres"
@@ -130,7 +130,7 @@ pub(crate) fn samplings(
 
 /// The skeletons of corrupted pairs under the true pose, by one network or several: the paper's figure
 /// 10. Pairs come with what they are called.
-pub(crate) fn agreement(networks: &[(&str, &dyn Register)], pairs: &[(String, Pair)]) -> Option<Figure> {
+pub(crate) fn agreement(networks: &[(&str, &dyn Register)], pairs: &[(String, Pair)]) -> Option<Picture> {
     let width = 1 + networks.len();
     let mut grid = Grid::new(2 * width, pairs.len().div_ceil(2));
     for (place, (name, pair)) in pairs.iter().enumerate() {
@@ -148,7 +148,7 @@ pub(crate) fn agreement(networks: &[(&str, &dyn Register)], pairs: &[(String, Pa
             grid.dots(&view, &moved, RED, 3.0);
         }
     }
-    Some(Figure {
+    Some(Picture {
         file: "skeletons.svg".into(),
         caption: "Skeletons of corrupted pairs under the true pose (figure 10): clouds of source (blue) and target \
                   (green); skeleton of the source red, of the target green"

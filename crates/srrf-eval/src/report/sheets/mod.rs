@@ -14,7 +14,7 @@ use super::sheet::{Cell, Sheet};
 use crate::metrics::Scores;
 use crate::protocol::CLEAN;
 use crate::quantities::{QUANTITIES, Quantity};
-use crate::rows::Row;
+use crate::rows::TableRow;
 use crate::summary::{SeverityKey, Summary, SummaryRow};
 
 const RANKING_NOTE: &str = "\
@@ -38,7 +38,7 @@ pub(crate) fn ranking(
         [name.into()].into_iter().chain(numbers).collect()
     };
     for corruption in summary.corruptions() {
-        let cell = |method: &&Row| summary.get(corruption, SeverityKey::Mean, method).and_then(value);
+        let cell = |method: &&TableRow| summary.get(corruption, SeverityKey::Mean, method).and_then(value);
         sheet.rows.push(line(corruption, methods.iter().map(cell).collect()));
     }
     let means: Vec<Option<f64>> = methods.iter().map(|m| summary.over_corruptions(m, value)).collect();
@@ -48,7 +48,7 @@ pub(crate) fn ranking(
     }
     for row in 0..sheet.rows.len() {
         sheet.mark_best_of_row(row, quantity.more_is_better, |column| {
-            column > 0 && *methods[column - 1] != Row::Oracle
+            column > 0 && *methods[column - 1] != TableRow::Oracle
         });
     }
     sheet
@@ -152,7 +152,7 @@ pub(crate) fn costs(summary: &Summary) -> Sheet {
 
 /// Whether a cell names the oracle, which competes with nobody.
 fn is_oracle(cell: &Cell) -> bool {
-    *cell == (&Row::Oracle).into()
+    *cell == (&TableRow::Oracle).into()
 }
 
 #[cfg(test)]
@@ -162,7 +162,7 @@ mod tests {
 
     pub(super) fn summary() -> Summary {
         let mut outcome = outcome();
-        outcome.rows = vec![Row::ICP, Row::SRRF];
+        outcome.rows = vec![TableRow::ICP, TableRow::SRRF];
         Summary::of(&outcome).unwrap()
     }
 

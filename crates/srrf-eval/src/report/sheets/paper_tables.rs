@@ -7,7 +7,7 @@ use crate::metrics::Scores;
 use crate::protocol::CLEAN;
 use crate::report::paper;
 use crate::report::sheet::{Cell, Sheet};
-use crate::rows::Row;
+use crate::rows::TableRow;
 use crate::summary::{SeverityKey, Summary};
 
 /// The paper's tables 1 to 3, one for each family. Upsampling, which it left out, stands with the noise.
@@ -87,7 +87,7 @@ pub(crate) fn paper_tables(summary: &Summary, suffix: &str) -> Vec<Sheet> {
     sheets
 }
 
-fn paper_row(corruption: &str, method: &Row, ours: Option<&Scores>) -> Vec<Cell> {
+fn paper_row(corruption: &str, method: &TableRow, ours: Option<&Scores>) -> Vec<Cell> {
     let values = ours.map(paper::values);
     let paper = paper::find(corruption, method).map(|row| row.values);
     let digits = [2, 2, 2, 6, 4, 4];
@@ -136,7 +136,7 @@ mod tests {
         // Mean of the severities 1 and 3 of the made-up outcome; the best of ours is marked.
         assert_eq!(
             table.rows[0][3],
-            Cell::Best(summary().get("cutout", SeverityKey::Mean, &Row::ICP).unwrap().scores.rmse_r, 2)
+            Cell::Best(summary().get("cutout", SeverityKey::Mean, &TableRow::ICP).unwrap().scores.rmse_r, 2)
         );
         assert_eq!((&table.rows[2][1], &table.rows[2][3]), (&"pointnetlk".into(), &Cell::None));
         assert!(table.rows.iter().all(|r| r.len() == table.head.len()));

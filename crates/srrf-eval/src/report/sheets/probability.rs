@@ -50,7 +50,7 @@ pub(crate) fn probability(summary: &Summary) -> Option<Sheet> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rows::Row;
+    use crate::rows::TableRow;
     use crate::summary::tests::outcome;
 
     #[test]
@@ -62,11 +62,11 @@ mod tests {
             sheet
                 .rows
                 .iter()
-                .all(|row| row[1] == (&Row::method("b")).into() && row.len() == sheet.head.len())
+                .all(|row| row[1] == (&TableRow::method("b")).into() && row.len() == sheet.head.len())
         );
         assert_eq!(sheet.rows[2][5], Cell::Number(0.0, 1), "answered at severity 1, wrongly");
         let mut quiet = summary;
-        quiet.rows.retain(|row| row.method == Row::method("a"));
+        quiet.rows.retain(|row| row.method == TableRow::method("a"));
         assert_eq!(probability(&quiet), None);
     }
 }

@@ -4,7 +4,7 @@ use crate::chamfer::SkeletonAgreement;
 use crate::protocol::{CLEAN, MIDDLE};
 use crate::report::paper;
 use crate::report::sheet::{Cell, Sheet};
-use crate::rows::Row;
+use crate::rows::TableRow;
 use crate::summary::{SeverityKey, Summary};
 
 /// Table 5: the Chamfer distance between the skeletons of a pair, with and without the loss.
@@ -33,8 +33,8 @@ pub(crate) fn table5(with: &Summary, without: Option<&Summary>) -> Option<Sheet>
     for corruption in with.corruptions() {
         // The severity that every network is scored at; clean pairs have none.
         let agreement = |summary: &Summary| {
-            let middle = summary.get(corruption, SeverityKey::One(MIDDLE.get()), &Row::SRRF);
-            middle.or_else(|| summary.get(corruption, SeverityKey::Mean, &Row::SRRF))?.skeletons
+            let middle = summary.get(corruption, SeverityKey::One(MIDDLE.get()), &TableRow::SRRF);
+            middle.or_else(|| summary.get(corruption, SeverityKey::Mean, &TableRow::SRRF))?.skeletons
         };
         let (Some(a), b) = (agreement(with), without.and_then(agreement)) else { continue };
         sheet.rows.push(agreement_row(corruption, &a, b.as_ref()));

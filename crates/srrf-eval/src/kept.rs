@@ -1,4 +1,4 @@
-//! [`Found`]: what a method answered on a pair, as it is scored and kept.
+//! [`KeptAnswer`]: what a method answered on a pair, as it is scored and kept.
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -8,24 +8,24 @@ use crate::chamfer::SkeletonAgreement;
 
 /// What a method answered on a pair, and how long it took. Written as JSON it keeps every bit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Found {
+pub(crate) struct KeptAnswer {
     /// Time of the call, in seconds, divided by the pairs in it.
     #[serde(rename = "s")]
     pub seconds: Exact,
     /// The answer, or why there is none.
     #[serde(flatten)]
-    pub answer: Result<Poses, String>,
+    pub answer: Result<KeptPoses, String>,
 }
 
 /// The parts of a [`Registration`] that are scored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Poses {
+pub(crate) struct KeptPoses {
     /// The method's pose.
     #[serde(rename = "p", with = "pose")]
     pub pose: Rigid,
     /// The poses of its branches, by name.
     #[serde(rename = "b", default, skip_serializing_if = "Vec::is_empty")]
-    pub branches: Vec<BranchPose>,
+    pub branches: Vec<KeptBranch>,
     /// Iterations used.
     #[serde(rename = "i")]
     pub iterations: usize,
@@ -42,7 +42,7 @@ pub(crate) struct Poses {
 
 /// The pose of a branch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct BranchPose {
+pub(crate) struct KeptBranch {
     /// Name of the branch.
     #[serde(rename = "n")]
     pub name: String,
@@ -51,15 +51,15 @@ pub(crate) struct BranchPose {
     pub pose: Rigid,
 }
 
-impl Found {
+impl KeptAnswer {
     /// Keeps what is scored of an answer.
     pub fn new(answer: Result<Registration, RegisterError>, truth: &Rigid, seconds: f64) -> Self {
-        let poses = |found: Registration| Poses {
+        let poses = |found: Registration| KeptPoses {
             pose: found.target_from_source,
             branches: found
                 .branches
                 .iter()
-                .map(|b| BranchPose { name: b.name.to_owned(), pose: b.target_from_source })
+                .map(|b| KeptBranch { name: b.name.to_owned(), pose: b.target_from_source })
                 .collect(),
             iterations: found.iterations,
             converged: found.converged,
@@ -73,7 +73,7 @@ impl Found {
     }
 }
 
-impl Poses {
+impl KeptPoses {
     /// How well the skeletons agree; `None` from methods without skeletons.
     pub fn agreement(&self) -> Option<SkeletonAgreement> {
         self.skeletons.map(|[chamfer, chamfer_sum, spread]| SkeletonAgreement {
@@ -155,10 +155,10 @@ mod tests {
         };
         let answers = [Ok(found), Err(RegisterError::NoPose("a \"reason\"\nof two lines".into()))];
         for answer in answers {
-            let kept = Found::new(answer, &pose, 0.1 + 0.7);
+            let kept = KeptAnswer::new(answer, &pose, 0.1 + 0.7);
             let text = serde_json::to_string(&kept).unwrap();
             assert!(!text.contains('\n'));
-            assert_eq!(serde_json::from_str::<Found>(&text).unwrap(), kept);
+            assert_eq!(serde_json::from_str::<KeptAnswer>(&text).unwrap(), kept);
             assert!(kept.answer.is_err() || kept.answer.as_ref().unwrap().agreement().unwrap().spread > 0.0);
         }
     }
@@ -167,7 +167,7 @@ mod tests {
     fn answers_that_were_kept_before_methods_were_sure_can_be_read() {
         let one = r#""1e0","0e0","0e0","0e0","1e0","0e0","0e0","0e0","1e0","0e0","0e0","0e0""#;
         let line = format!(r#"{{"s":"5e-1","Ok":{{"p":[{one}],"i":3,"c":true}}}}"#);
-        let kept: Found = serde_json::from_str(&line).unwrap();
+        let kept: KeptAnswer = serde_json::from_str(&line).unwrap();
         let poses = kept.answer.unwrap();
         assert_eq!((poses.pose, poses.iterations, poses.certainty()), (Rigid::identity(), 3, None));
     }
