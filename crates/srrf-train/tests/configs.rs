@@ -96,7 +96,10 @@ fn no_configuration_is_left_out() {
     let shared = ["configs/base.toml", "configs/modelnet-gpu.toml"];
     for path in files(&root().join("configs")) {
         let place = place(&path);
-        assert!(known.contains(&place) || shared.contains(&place.as_str()), "{place} is compared with nothing");
+        assert!(
+            known.contains(&place) || shared.contains(&place.as_str()),
+            "{place} is compared with nothing"
+        );
     }
     for path in files(&root().join("lab/sweeps")) {
         // Lists of other things than trainings have no runs.

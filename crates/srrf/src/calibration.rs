@@ -48,7 +48,7 @@ impl Logistic {
     /// [`CalibrationError`] if the file in the program was damaged at build time.
     pub fn embedded() -> Result<Self, CalibrationError> {
         let model: Self =
-            serde_json::from_str(include_str!("../calibration.json")).map_err(CalibrationError::Format)?;
+            serde_json::from_str(include_str!("calibration.json")).map_err(CalibrationError::Format)?;
         let need = Features::default().expanded().len();
         match [&model.mean, &model.deviation, &model.weights].map(Vec::len).into_iter().find(|n| *n != need) {
             Some(have) => Err(CalibrationError::Length { have, need }),

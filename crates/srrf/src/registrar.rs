@@ -12,7 +12,7 @@ use crate::outcome::{Outcome, PointCounts};
 use crate::proposals::{Proposals, Round, rounds};
 use crate::request::{Request, RequestTarget};
 use crate::search::{Best, Search};
-use crate::stage::{Clock, Stage, StageTime};
+use crate::stage::{Stage, StageClock, StageTime};
 use crate::target::{PreparedPair, Target};
 use crate::warning::Warning;
 
@@ -86,14 +86,14 @@ impl Registrar {
     }
 
     /// Checks, centres, thins and indexes both clouds; the target only if it is not ready yet.
-    fn prepare_pair(&self, request: &Request<'_>) -> Result<(PreparedPair, Clock), Error> {
+    fn prepare_pair(&self, request: &Request<'_>) -> Result<(PreparedPair, StageClock), Error> {
         Solid::new(request.source).map_err(Error::Source)?;
         let target = match request.target {
             RequestTarget::Cloud(cloud) => self.prepare(cloud)?,
             RequestTarget::Prepared(target) => target.clone(),
         };
         let prepared = StageTime { stage: Stage::PrepareTarget, seconds: target.0.seconds };
-        let mut clock = Clock::after(vec![prepared]);
+        let mut clock = StageClock::after(vec![prepared]);
         let initial = request.initial.unwrap_or_else(Rigid::identity);
         let pair = PreparedPair::new(request.source, target, &initial, &self.options)?;
         clock.lap(Stage::PrepareSource);

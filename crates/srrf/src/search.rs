@@ -8,7 +8,7 @@ use crate::error::NoPose;
 use crate::features::Features;
 use crate::outcome::TriedStart;
 use crate::proposals::{Proposal, Proposals, Proposed};
-use crate::stage::{Clock, Stage, StageTime};
+use crate::stage::{Stage, StageClock, StageTime};
 use crate::start::Start;
 use crate::target::PreparedPair;
 use crate::warning::Warning;
@@ -38,7 +38,7 @@ pub(crate) struct Learned {
 pub(crate) struct Search<'a> {
     pair: &'a PreparedPair,
     refine: bool,
-    clock: Clock,
+    clock: StageClock,
     starts: Vec<Start>,
     /// One for each of `starts`.
     supports: Vec<StartSupport>,
@@ -52,7 +52,7 @@ pub(crate) struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// Without starts. Where `refine` is false they are compared as they are. `clock` goes on with its times.
-    pub fn new(pair: &'a PreparedPair, refine: bool, clock: Clock) -> Self {
+    pub fn new(pair: &'a PreparedPair, refine: bool, clock: StageClock) -> Self {
         Self {
             pair,
             refine,
@@ -184,7 +184,7 @@ mod tests {
             Proposal { start, pose: by.compose(&pair.initial) }
         };
 
-        let mut search = Search::new(&pair, true, Clock::after(Vec::new()));
+        let mut search = Search::new(&pair, true, StageClock::after(Vec::new()));
         assert!(search.best(Stage::Refine).unwrap().is_none());
         let far = [off(Start::Icp, [90.0, 60.0, 20.0]), off(Start::Given, [-70.0, 40.0, 110.0])];
         search.add(&far).unwrap();

@@ -71,12 +71,12 @@ pub struct StageTime {
 
 /// Measures stages one after the other.
 #[derive(Debug)]
-pub(crate) struct Clock {
+pub(crate) struct StageClock {
     last: Instant,
     times: Vec<StageTime>,
 }
 
-impl Clock {
+impl StageClock {
     /// Starts with stages that were measured before.
     pub fn after(times: Vec<StageTime>) -> Self {
         Self { last: Instant::now(), times }

@@ -80,8 +80,14 @@ fn options_that_make_no_sense() {
     if cfg!(not(feature = "rerun")) {
         says(&register(&["--rrd", "out.rrd"]), 2, &["--rrd", "--features rerun", "--html"]);
     }
-    says(&register(&["--threads", "0"]), 2, &["--threads <N>", "from 1 to 4,096"]);
-    says(&register(&["--seed", "-1"]), 2, &["--seed <N>", "a whole number from 0 to"]);
+    // What the parser of arguments refuses ends with a hint at --help.
+    for (name, number, words) in
+        [("threads", "0", "from 1 to 4,096"), ("seed", "-1", "a whole number from 0 to")]
+    {
+        let done = register(&[&format!("--{name}"), number]);
+        assert!(done.code == 2 && done.err.starts_with("error: "), "{done:?}");
+        assert!(done.err.contains(&format!("--{name} <N>")) && done.err.contains(words), "{done:?}");
+    }
     says(&register(&["--format-source", "pcd"]), 2, &["source.ply", "streams only"]);
     for bad in [&["--method", "magic"][..], &["--rotation", "90"], &["--seed", "-1"], &["--nonsense"]] {
         let done = register(bad);

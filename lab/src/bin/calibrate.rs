@@ -3,7 +3,7 @@
 //! `cargo run --release -p srrf-lab --bin calibrate -- [PAIRS] [MODELNET]` makes PAIRS pairs (default 1,200)
 //! from built-in shapes and, if MODELNET is given, from the shapes of ModelNet40's training split that the
 //! network was validated on; no test shape is looked at. Every fifth pair is held out for the table; the
-//! file `crates/srrf/calibration.json` is fitted on all the others.
+//! file `crates/srrf/src/calibration.json` is fitted on all the others.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
 
 use std::path::Path;
@@ -64,7 +64,7 @@ fn main() {
         },
     );
     let model = Logistic::fit(&pairs_of(fitted), 10.0, what).unwrap();
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/srrf/calibration.json");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/srrf/src/calibration.json");
     std::fs::write(&path, serde_json::to_string_pretty(&model).unwrap() + "\n").unwrap();
 
     println!("the file that was in the program, on all pairs:");

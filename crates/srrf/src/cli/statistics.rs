@@ -77,7 +77,7 @@ impl Statistics {
         let duplicates = 1.0 - distinct.len() as f64 / points.len() as f64;
         let index = KnnIndex::new(&distinct)?;
         let spacing = spacing_of(&index);
-        let local = Local::new(&index, spacing);
+        let local = LocalSpread::new(&index, spacing);
         Ok(Self {
             points: points.len(),
             low,
@@ -136,7 +136,7 @@ impl Statistics {
 }
 
 /// Figures of neighbourhoods.
-struct Local {
+struct LocalSpread {
     asked: usize,
     density: f64,
     outliers: f64,
@@ -145,7 +145,7 @@ struct Local {
     roughness: f64,
 }
 
-impl Local {
+impl LocalSpread {
     fn new(index: &KnnIndex, spacing: f64) -> Self {
         let step = index.len().div_ceil(ASKED);
         let asked: Vec<&[f64; 3]> = index.points().iter().step_by(step).collect();

@@ -22,11 +22,11 @@ const CARDS: &[(&str, &str)] = &[
 #[derive(Debug, Args)]
 pub struct WeightsArgs {
     #[command(subcommand)]
-    command: Option<Command>,
+    command: Option<WeightsCommand>,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum WeightsCommand {
     /// List the models in the program (the default)
     List,
     /// Show the card of a model: what it was trained on, how well it does, where it fails
@@ -50,9 +50,9 @@ enum Command {
 /// [`Failure`], with its exit code.
 pub fn run(args: &WeightsArgs) -> Result<ExitCode, Failure> {
     let text = match &args.command {
-        None | Some(Command::List) => list()?,
-        Some(Command::Show { name }) => show(name)?.to_owned(),
-        Some(Command::Verify { weights, sha256 }) => verify(weights, sha256.as_deref())?,
+        None | Some(WeightsCommand::List) => list()?,
+        Some(WeightsCommand::Show { name }) => show(name)?.to_owned(),
+        Some(WeightsCommand::Verify { weights, sha256 }) => verify(weights, sha256.as_deref())?,
     };
     files::write(Path::new("-"), format!("{}\n", text.trim_end()).as_bytes())?;
     Ok(ExitCode::SUCCESS)

@@ -15,13 +15,13 @@ use crate::warning::Warning;
 
 /// ICP, point to point.
 #[derive(Debug)]
-struct FromFirstGuess;
+struct IcpFromFirstGuess;
 
 pub(super) fn from_first_guess(options: &Options, _: Option<&Arc<Network>>) -> Option<Box<dyn Proposals>> {
-    (options.method == Method::Icp).then(|| Box::new(FromFirstGuess) as _)
+    (options.method == Method::Icp).then(|| Box::new(IcpFromFirstGuess) as _)
 }
 
-impl Proposals for FromFirstGuess {
+impl Proposals for IcpFromFirstGuess {
     fn round(&self) -> Round {
         Round::Cheap
     }

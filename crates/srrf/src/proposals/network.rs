@@ -17,14 +17,14 @@ use crate::warning::Warning;
 
 /// The fused pose and those of the branches, of one look from the first guess.
 #[derive(Debug)]
-struct FromFirstGuess(Arc<Network>);
+struct NetworkFromFirstGuess(Arc<Network>);
 
 /// The fused poses of a glance from each of the other 23 orientations of a cube.
 #[derive(Debug)]
 struct AllAround(Arc<Network>);
 
 pub(super) fn from_first_guess(_: &Options, network: Option<&Arc<Network>>) -> Option<Box<dyn Proposals>> {
-    network.map(|network| Box::new(FromFirstGuess(network.clone())) as _)
+    network.map(|network| Box::new(NetworkFromFirstGuess(network.clone())) as _)
 }
 
 pub(super) fn all_around(options: &Options, network: Option<&Arc<Network>>) -> Option<Box<dyn Proposals>> {
@@ -32,7 +32,7 @@ pub(super) fn all_around(options: &Options, network: Option<&Arc<Network>>) -> O
     Some(Box::new(AllAround(network.clone())))
 }
 
-impl Proposals for FromFirstGuess {
+impl Proposals for NetworkFromFirstGuess {
     fn round(&self) -> Round {
         Round::Cheap
     }
