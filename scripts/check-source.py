@@ -8,7 +8,8 @@ circles  no two files of a crate import each other, over however many others: th
          the item stands). What a folder's mod.rs defines is for the files in it, so arrows from them to it do
          not count, and tests may look at everything
 lines    no .rs file is over 400 lines
-names    at most 15 names of types stand for two things: a type is a struct, enum, union, trait or alias outside tests
+names    at most 15 names of types stand for two things: a type is a struct, enum, union, trait or alias, outside tests
+         and the programs of lab/
 readme   README.md: at most 110 lines, none over 110 characters, no sentence over 35 words
 
 Python, because this runs before anything is compiled, in a second, and needs nothing but python3.
@@ -59,7 +60,7 @@ class Module:
     def __init__(self, file, parent, name):
         self.file, self.parent, self.name = file, parent, name
         self.children, self.items, self.imports, self.globs, self.paths = {}, set(), {}, [], []
-        self.types, self.words = [], set()
+        self.types, self.words, self.left_out = [], set(), set()
 
     def root(self):
         return self if self.parent is None else self.parent.root()
@@ -132,6 +133,7 @@ def read_module(module, words, folder):
             at = end
             continue
         if any(map(is_test, attributes)) and word not in ("pub", "("):  # skip what is for tests: up to `;` or the body's end
+            module.left_out.add(words[at + 1] if word == "mod" else "")
             while at < len(words) and words[at] not in (";", "{"):
                 at = closing(words, at) if words[at] in "([" else at + 1
             at = closing(words, at) if at < len(words) and words[at] == "{" else at + 1
@@ -150,8 +152,7 @@ def read_module(module, words, folder):
                 place = next((p for p in places if p.is_file()), None)
                 if place:
                     child = module.children[name] = Module(place, module, name)
-                    inside = place.parent if place.name == "mod.rs" else place.parent / place.stem
-                    read_module(child, tokens(place.read_text()), inside)
+                    read_file(child, place.parent if place.name == "mod.rs" else place.parent / place.stem)
                 at += 3
             attributes = []
             continue
@@ -189,6 +190,19 @@ def read_module(module, words, folder):
         if word in (";", "}", "{"):
             attributes = []
         at += 1
+
+
+def read_file(module, folder):
+    """Reads a module from its file, and the modules that a macro there declares: files beside it that it names."""
+    words = tokens(module.file.read_text())
+    read_module(module, words, folder)
+    if module.file.name in ("lib.rs", "mod.rs"):
+        beside = {place.stem: place for place in folder.glob("*.rs")} | {p.parent.name: p for p in folder.glob("*/mod.rs")}
+        for name, place in sorted(beside.items()):
+            known = name in module.children or name in module.left_out or place == module.file or name in ("lib", "main")
+            if not known and name in words:
+                child = module.children[name] = Module(place, module, name)
+                read_file(child, place.parent if place.name == "mod.rs" else place.parent / place.stem)
 
 
 def resolve(module, path, seen=()):
@@ -281,7 +295,7 @@ def roots(folder):
         for file in [source / "lib.rs", source / "main.rs", *sorted(mains)]:
             if file.is_file():
                 root = Module(file, None, manifest.parent.name)
-                read_module(root, tokens(file.read_text()), file.parent)
+                read_file(root, file.parent)
                 yield root
 
 
@@ -311,6 +325,8 @@ def lines(folder):
 def names(folder):
     places = defaultdict(set)
     for root in roots(folder):
+        if root.name == "lab":
+            continue
         for module in root.all():
             for name in module.types:
                 places[name].add(str(module.file.relative_to(folder)))
