@@ -158,7 +158,7 @@ mod tests {
 
     use super::*;
     use crate::matching::{both_sides, support};
-    use crate::prepared::{RefineCloud, to_local};
+    use crate::prepared::RefineCloud;
 
     /// A pair that samples one shape twice.
     fn pair(corruption: Option<(CorruptionKind, Severity)>, item: u64) -> Pair {
@@ -181,7 +181,8 @@ mod tests {
 
     fn between(source: &PointCloud, target: &PointCloud, pose: &Rigid) -> AffineFit {
         let (source, target) = (RefineCloud::of(source), RefineCloud::of(target));
-        let (source, target, pose) = (source.coarse(), target.coarse(), to_local(pose, &source, &target));
+        let pose = source.frame_to(&target).pose(pose);
+        let (source, target) = (source.coarse(), target.coarse());
         let support = support(&both_sides(source, target, &pose), source.spacing.max(target.spacing));
         affine_fit(source, target, &pose, support)
     }

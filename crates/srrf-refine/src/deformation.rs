@@ -167,7 +167,7 @@ mod tests {
     fn structure(source: Vec<[f64; 3]>, target: Vec<[f64; 3]>) -> ResidualStructure {
         let prepared = |points| RefineCloud::of(&PointCloud::new(points).unwrap());
         let (source, target) = (prepared(source), prepared(target));
-        let pose = crate::prepared::to_local(&Rigid::identity(), &source, &target);
+        let pose = source.frame_to(&target).pose(&Rigid::identity());
         residual_structure(source.coarse(), target.coarse(), &pose)
     }
 

@@ -5,7 +5,7 @@ use serde::Serialize;
 use srrf_cloud::Rigid;
 
 use crate::matching::{Side, side_matches};
-use crate::prepared::{RefineCloud, to_local};
+use crate::prepared::RefineCloud;
 use crate::solve::NormalEquations;
 
 /// What speaks for a pose. Taken from the points that the last level of the refinement looked at:
@@ -53,7 +53,7 @@ impl Evidence {
 
 /// Measures a pose between the inputs.
 pub(crate) fn evidence(source: &RefineCloud, target: &RefineCloud, pose: &Rigid) -> Evidence {
-    let local = to_local(pose, source, target);
+    let local = source.frame_to(target).pose(pose);
     let (s, t) = (source.fine(), target.fine());
     let spacing = s.spacing.max(t.spacing);
     let limit = spacing * spacing;

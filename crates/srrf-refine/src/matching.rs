@@ -170,7 +170,7 @@ mod tests {
     use srrf_cloud::PointCloud;
 
     use super::*;
-    use crate::prepared::{RefineCloud, to_local};
+    use crate::prepared::RefineCloud;
 
     /// Points of a saddle, by chance.
     fn saddle(seed: u64) -> RefineCloud {
@@ -187,7 +187,7 @@ mod tests {
         let (one, other) = (saddle(1), saddle(2));
         let at = |up: f64| {
             let lifted = Rigid { translation: Vector3::new(0.0, 0.0, up), ..Rigid::identity() };
-            let pose = to_local(&lifted, &one, &other);
+            let pose = one.frame_to(&other).pose(&lifted);
             let (s, t) = (one.coarse(), other.coarse());
             let matches = both_sides(s, t, &pose);
             [support, plane_support].map(|of| of(&matches, s.spacing.max(t.spacing)))

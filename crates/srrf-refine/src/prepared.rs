@@ -1,9 +1,7 @@
 //! [`RefineCloud`]: a cloud centred, thinned, indexed, with normals.
 
 use nalgebra::Vector3;
-use srrf_cloud::{
-    CloudError, KnnIndex, PairFrame, PointCloud, Rigid, Solid, estimate_normals, spacing_of, thin_to,
-};
+use srrf_cloud::{CloudError, KnnIndex, PairFrame, PointCloud, Solid, estimate_normals, spacing_of, thin_to};
 
 use crate::RefineConfig;
 
@@ -85,14 +83,4 @@ impl RefineCloud {
     pub fn has_coarse(&self) -> bool {
         self.coarse.is_some()
     }
-}
-
-/// `pose` between the inputs as a pose between the centred clouds.
-pub(crate) fn to_local(pose: &Rigid, source: &RefineCloud, target: &RefineCloud) -> Rigid {
-    source.frame_to(target).pose(pose)
-}
-
-/// The way back from [`to_local`].
-pub(crate) fn to_global(pose: &Rigid, source: &RefineCloud, target: &RefineCloud) -> Rigid {
-    source.frame_to(target).undo_pose(pose)
 }

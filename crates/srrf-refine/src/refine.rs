@@ -8,7 +8,7 @@ use crate::affine::{AffineFit, affine_fit};
 use crate::deformation::{ResidualStructure, residual_structure};
 use crate::evidence::{Evidence, evidence};
 use crate::matching::{BothSides, both_sides, plane_support, support};
-use crate::prepared::{RefineCloud, to_global, to_local};
+use crate::prepared::RefineCloud;
 use crate::robust::{Descent, ScaleSchedule, descend};
 use crate::soft::soft;
 use crate::verdict::{self, Verdict};
@@ -74,9 +74,9 @@ impl RefineRun<'_> {
     /// Short runs of all starts, or just the support of a single one.
     pub fn shortlist(&self, starts: &[Rigid]) -> Vec<StartSupport> {
         let run = |given: &Rigid, short: bool| {
-            let local = to_local(given, self.source, self.target);
+            let local = self.local(given);
             let pose = if short { self.short_run(&local) } else { local };
-            let target_from_source = if short { to_global(&pose, self.source, self.target) } else { *given };
+            let target_from_source = if short { self.global(&pose) } else { *given };
             let (matches, spacing) = self.coarse_matches(&pose);
             let support = support(&matches, spacing);
             let rank = match self.config.ranking {
@@ -177,12 +177,12 @@ impl RefineRun<'_> {
 
     /// A pose between the inputs as one between the centred clouds.
     fn local(&self, pose: &Rigid) -> Rigid {
-        to_local(pose, self.source, self.target)
+        self.source.frame_to(self.target).pose(pose)
     }
 
     /// The way back from [`RefineRun::local`].
     fn global(&self, pose: &Rigid) -> Rigid {
-        to_global(pose, self.source, self.target)
+        self.source.frame_to(self.target).undo_pose(pose)
     }
 
     /// A few iterations on the coarse level.
