@@ -544,12 +544,24 @@ def memory_mib(key):
         return None
 
 
+def merged(below, above):
+    both = [key for key, value in above.items() if isinstance(value, dict) and isinstance(below.get(key), dict)]
+    return {**below, **above, **{key: merged(below[key], above[key]) for key in both}}
+
+
+def read_config(path):
+    """A configuration with those that it extends, as srrf-train reads them."""
+    with open(path, "rb") as file:
+        config = tomllib.load(file)
+    base = config.pop("extends", None)
+    return merged(read_config(Path(path).parent / base), config) if base else config
+
+
 def measure(arguments):
     start_mib = memory_mib("VmHWM:")
     torch.set_num_threads(arguments.threads)
     torch.manual_seed(1)
-    with open(arguments.config, "rb") as file:
-        config = tomllib.load(file)
+    config = read_config(arguments.config)
     optimizer_config, losses = config["optimizer"], config["losses"]
     model = Srrf(config["network"])
     if arguments.compile:

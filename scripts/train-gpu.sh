@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Trains on a CUDA device in slices, each shorter than a time limit, that go on where the last one stopped.
 #
-#   scripts/train-gpu.sh --data PATH [--config configs/modelnet.toml] [--folder gpu] [--minutes 9] [--slices N]
+#   scripts/train-gpu.sh --data PATH [--config configs/modelnet.toml, or LIST.toml#NAME] [--folder gpu] [--minutes 9] [--slices N]
 #   scripts/train-gpu.sh --prepare --data PATH     builds the program and packs the data, for another machine
 #
 # FOLDER holds all that the machine with the GPU needs beside this checkout: the program `srrf-train`, the
@@ -83,7 +83,8 @@ PY
 }
 
 needs_data=()
-if grep -q '^source = "modelnet"' "$config"; then
+# `source` of a configuration may stand in one that it extends; built-in shapes are said in the file itself.
+if ! grep -q '^source = "shapes"' "${config%%#*}"; then
   if [ ! -d "$folder/data" ]; then
     [ -n "$data" ] || { echo "train-gpu: say where ModelNet40 is: --data PATH" >&2; exit 2; }
     pack
@@ -98,8 +99,9 @@ fi
 if [ "$device" = cuda ] && ! ldconfig -p | grep -q 'libcuda\.so' && [ -z "${LD_LIBRARY_PATH:-}" ]; then
   echo "train-gpu: no libcuda.so; install NVIDIA's driver, or name its folder in LD_LIBRARY_PATH" >&2
 fi
+run=$(basename "${config##*#}" .toml) # the name in a list, or that of the file
 for ((slice = 1; slice <= slices; slice++)); do
-  "$folder/srrf-train" --config "$config" "${needs_data[@]}" --run "$folder/runs/$(basename "$config" .toml)" --device "$device" \
+  "$folder/srrf-train" --config "$config" "${needs_data[@]}" --run "$folder/runs/$run" --device "$device" \
     --minutes "$minutes" --resume 2>&1 | tee "$folder/slice.log"
   grep -q '^not complete' "$folder/slice.log" || { echo "complete after $slice slices"; exit; }
 done

@@ -66,7 +66,7 @@ pub enum CheckpointError {
 
 /// Where a run stands, beside its parameters.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Progress {
+pub struct RunProgress {
     /// Steps done.
     pub step: usize,
     /// Steps left out because a loss or gradient was not finite.
@@ -90,7 +90,7 @@ pub fn save<C: Trained>(
     config: &TrainConfig<C>,
     model: &C::Network,
     optimizer: &ModuleOptimizer,
-    progress: &Progress,
+    progress: &RunProgress,
 ) -> Result<(), CheckpointError> {
     let path = folder.join(FILE);
     let broken = |why: String| CheckpointError::Broken { path: path.clone(), why };
@@ -137,7 +137,7 @@ pub fn load<C: Trained>(
     config: &TrainConfig<C>,
     optimizer: ModuleOptimizer,
     device: &Device,
-) -> Result<Option<(C::Network, ModuleOptimizer, Progress)>, CheckpointError> {
+) -> Result<Option<(C::Network, ModuleOptimizer, RunProgress)>, CheckpointError> {
     let path = folder.join(FILE);
     let bytes = match std::fs::read(&path) {
         Ok(bytes) => bytes,
@@ -151,7 +151,8 @@ pub fn load<C: Trained>(
     if header.get("format").is_none_or(|format| format != FORMAT) {
         return Err(broken("written by another version of this program".into()));
     }
-    let progress: Progress = serde_json::from_str(entry("progress")?).map_err(|e| broken(e.to_string()))?;
+    let progress: RunProgress =
+        serde_json::from_str(entry("progress")?).map_err(|e| broken(e.to_string()))?;
     let (saved, wanted) =
         comparable(entry("config")?, config).map_err(|e: serde_json::Error| broken(e.to_string()))?;
     if let Some(key) = first_difference(&saved, &wanted, String::new()) {

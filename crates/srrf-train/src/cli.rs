@@ -32,7 +32,7 @@ pub struct Arguments {
     #[command(subcommand)]
     pub command: Option<Command>,
 
-    /// The configuration; see configs/, and `srrf-train keys` for what it may hold
+    /// The configuration, or a run of a list, LIST.toml#NAME; see configs/, lab/sweeps/, and `srrf-train keys`
     #[arg(long, value_name = value::FILE, required = true)]
     pub config: Option<PathBuf>,
 

@@ -12,8 +12,7 @@ use srrf_corrupt::crop::{crop, random_direction};
 use srrf_corrupt::datasets::{ACCEPTED_LAYOUTS, ShapeSource, SourceError, Split, held_out, open};
 use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{
-    CorruptionKind, Pair, PairConfig, PairError, PairSynthesizer, PoseDraw, Sampling, Severity,
-    Stream as PairStream,
+    CorruptionKind, Pair, PairConfig, PairError, PairSynthesizer, PoseDraw, Sampling, Severity, Stream,
 };
 
 use crate::config::{DataSource, DrawConfig, TrainConfig};
@@ -70,7 +69,7 @@ pub fn training_shapes<C: Trained>(
 
 /// Stream of a generator: keeps the draws of training, validation and shuffling apart.
 #[derive(Clone, Copy)]
-enum Stream {
+enum DrawStream {
     Shuffle = 1,
     Training = 2,
     Validation = 3,
@@ -80,7 +79,7 @@ enum Stream {
 }
 
 /// A generator for item `item` of `stream`.
-fn generator(seed: u64, stream: Stream, item: u64) -> ChaCha8Rng {
+fn generator(seed: u64, stream: DrawStream, item: u64) -> ChaCha8Rng {
     let mut key = [0_u8; 32];
     key[..8].copy_from_slice(&seed.to_le_bytes());
     key[8..16].copy_from_slice(&(stream as u64).to_le_bytes());
@@ -140,7 +139,7 @@ impl TrainingPairs {
     /// Order of the training shapes in an epoch.
     fn order(&self, epoch: usize) -> Vec<usize> {
         let mut order = self.training.clone();
-        order.shuffle(&mut generator(self.seed, Stream::Shuffle, epoch as u64));
+        order.shuffle(&mut generator(self.seed, DrawStream::Shuffle, epoch as u64));
         order
     }
 
@@ -149,14 +148,14 @@ impl TrainingPairs {
     /// # Errors
     /// [`PairError`] when a shape cannot be read or corrupted.
     pub fn shard(&self, first: usize, count: usize) -> Result<Vec<Pair>, PairError> {
-        let mut rng = generator(self.seed, Stream::Shard, first as u64);
+        let mut rng = generator(self.seed, DrawStream::Shard, first as u64);
         let independent = rng.random_bool(self.draw.independent);
         if let Some((shapes, share)) = &self.built_in
             && rng.random_bool(*share)
         {
             return (first..first + count)
                 .map(|number| {
-                    let mut rng = generator(self.seed, Stream::BuiltIn, number as u64);
+                    let mut rng = generator(self.seed, DrawStream::BuiltIn, number as u64);
                     let sampled = Sampled { shapes, independent, points: self.pairs.points };
                     self.training_pair(sampled, rng.random_range(0..shapes.len()), number)
                 })
@@ -177,7 +176,7 @@ impl TrainingPairs {
     }
 
     fn training_pair(&self, sampled: Sampled, shape: usize, number: usize) -> Result<Pair, PairError> {
-        let mut rng = generator(self.seed, Stream::Training, number as u64);
+        let mut rng = generator(self.seed, DrawStream::Training, number as u64);
         let mut pairs = PairConfig { points: sampled.points, ..self.pairs };
         if sampled.independent {
             pairs.sampling = Sampling::Independent;
@@ -196,7 +195,7 @@ impl TrainingPairs {
             (_, true) => PoseDraw::Given(random_pose(&mut rng, draw.turned_deg, pairs.translation)),
             _ => PoseDraw::Seeded,
         };
-        let stream = PairStream { seed: rng.random(), item: number as u64 };
+        let stream = Stream { seed: rng.random(), item: number as u64 };
         let synthesizer = PairSynthesizer::new(pairs)?;
         let mut pair = if turned {
             let shapes = Turned { shapes: sampled.shapes, rotation: random_pose(&mut rng, 180.0, 0.0) };
@@ -204,7 +203,7 @@ impl TrainingPairs {
         } else {
             synthesizer.pair(sampled.shapes, shape, corruption, pose, stream)?
         };
-        let mut rng = generator(self.seed, Stream::Crop, number as u64);
+        let mut rng = generator(self.seed, DrawStream::Crop, number as u64);
         if self.draw.cropped > 0.0 && rng.random_bool(self.draw.cropped) {
             self.crop(&mut pair, &mut rng)?;
         }
@@ -236,14 +235,14 @@ impl TrainingPairs {
     /// [`PairError`] when a shape cannot be read or corrupted.
     pub fn validation(&self, severity: Severity) -> Result<Vec<Pair>, PairError> {
         let synthesizer = PairSynthesizer::new(self.pairs)?;
-        let seed = generator(self.seed, Stream::Validation, 0).random::<u64>();
+        let seed = generator(self.seed, DrawStream::Validation, 0).random::<u64>();
         self.validation
             .iter()
             .enumerate()
             .map(|(i, &shape)| {
                 let kind = self.kinds.get(i % (self.kinds.len() + 1)).copied();
                 let corruption = kind.map(|kind| (kind, severity));
-                let stream = PairStream { seed, item: i as u64 };
+                let stream = Stream { seed, item: i as u64 };
                 synthesizer.pair(self.shapes.as_ref(), shape, corruption, PoseDraw::Seeded, stream)
             })
             .collect()

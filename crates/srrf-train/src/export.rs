@@ -5,7 +5,7 @@ use std::path::Path;
 
 use srrf_model::weights::{WeightsError, to_safetensors, write_atomically};
 
-use crate::checkpoint::Progress;
+use crate::checkpoint::RunProgress;
 use crate::config::{DataSource, TrainConfig};
 use crate::seam::Trained;
 use crate::validate::Validation;
@@ -13,7 +13,7 @@ use crate::validate::Validation;
 /// What is known of the weights beside their configuration.
 pub(crate) struct Provenance<'a> {
     /// Where the run stands.
-    pub progress: &'a Progress,
+    pub progress: &'a RunProgress,
     /// Shapes to train on.
     pub training: usize,
     /// Pairs to validate on.

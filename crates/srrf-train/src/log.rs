@@ -159,12 +159,12 @@ fn round(value: f64) -> f64 {
 
 /// The losses since the last line of the log.
 #[derive(Default)]
-pub struct Window {
+pub struct LossWindow {
     sums: Losses,
     steps: usize,
 }
 
-impl Window {
+impl LossWindow {
     /// Adds those of a step; none where it was left out.
     pub fn add(&mut self, losses: Losses) {
         self.steps += usize::from(!losses.is_empty());

@@ -7,11 +7,11 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Items made ahead, by number.
 pub struct Prefetch<T> {
-    state: Mutex<State<T>>,
+    state: Mutex<PrefetchState<T>>,
     changed: Condvar,
 }
 
-struct State<T> {
+struct PrefetchState<T> {
     /// The number that the next free thread makes.
     next: usize,
     /// Items may be made up to here.
@@ -24,7 +24,7 @@ struct State<T> {
 impl<T: Send> Prefetch<T> {
     /// Items from number `first` on, at most `depth` more than were taken.
     pub fn new(first: usize, depth: usize) -> Self {
-        let state = State { next: first, end: first + depth, ready: BTreeMap::new(), closed: false };
+        let state = PrefetchState { next: first, end: first + depth, ready: BTreeMap::new(), closed: false };
         Self { state: Mutex::new(state), changed: Condvar::new() }
     }
 
@@ -70,7 +70,7 @@ impl<T: Send> Prefetch<T> {
         self.changed.notify_all();
     }
 
-    fn lock(&self) -> MutexGuard<'_, State<T>> {
+    fn lock(&self) -> MutexGuard<'_, PrefetchState<T>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -8,7 +8,7 @@ use burn::tensor::{Device, Tensor};
 use srrf_model::ops::{CopyError, to_host};
 
 /// The parameters of a part as rows, each with its gradient if it has one.
-type Part = Vec<(Tensor<1>, Option<Tensor<1>>)>;
+type PartRows = Vec<(Tensor<1>, Option<Tensor<1>>)>;
 
 /// The gradient of each part; none where nothing in it was trained.
 pub struct RowGradients(Vec<Option<Tensor<1>>>);
@@ -16,13 +16,13 @@ pub struct RowGradients(Vec<Option<Tensor<1>>>);
 impl RowGradients {
     /// The gradients of `network`, which must be off the graph, without those of other modules.
     pub fn new<M: Module>(gradients: GradientsParams, network: &M) -> Self {
-        let whole = |part: Part| {
+        let whole = |part: PartRows| {
             let trained = part.iter().any(|(_, gradient)| gradient.is_some());
             let filled =
                 part.into_iter().map(|(value, gradient)| gradient.unwrap_or_else(|| value.zeros_like()));
             trained.then(|| Tensor::cat(filled.collect(), 0))
         };
-        Self(Collector::of(network, gradients).into_iter().map(whole).collect())
+        Self(RowCollector::of(network, gradients).into_iter().map(whole).collect())
     }
 
     /// The same numbers on another device.
@@ -67,20 +67,20 @@ impl RowGradients {
 /// Burn's optimiser on the rows of a network.
 pub struct Updater {
     optimizer: ModuleOptimizer,
-    rows: Rows,
+    rows: ParameterRows,
 }
 
 impl Updater {
     /// The optimiser, new or with the state that [`Updater::optimizer`] had, on the parameters of `network`,
     /// which must be off the graph.
     pub fn new<M: Module>(optimizer: ModuleOptimizer, network: &M) -> Self {
-        let part = |(i, part): (usize, Part)| {
+        let part = |(i, part): (usize, PartRows)| {
             let values = part.into_iter().map(|(value, _)| value).collect();
             // Numbered in order, so that the state finds its rows again in another process.
             Param::initialized(ParamId::from(i as u64 + 1), Tensor::cat(values, 0))
         };
-        let parts = Collector::of(network, GradientsParams::new());
-        Self { optimizer, rows: Rows { parts: parts.into_iter().enumerate().map(part).collect() } }
+        let parts = RowCollector::of(network, GradientsParams::new());
+        Self { optimizer, rows: ParameterRows { parts: parts.into_iter().enumerate().map(part).collect() } }
     }
 
     /// What a checkpoint keeps.
@@ -108,7 +108,7 @@ impl Updater {
 
 /// The parameters of each part.
 #[derive(Module, Debug)]
-struct Rows {
+struct ParameterRows {
     parts: Vec<Param<Tensor<1>>>,
 }
 
@@ -141,21 +141,21 @@ impl Path {
 }
 
 /// Collects the parameters of each part as rows, with their gradients where there are any.
-struct Collector {
+struct RowCollector {
     gradients: GradientsParams,
     path: Path,
-    parts: Vec<Part>,
+    parts: Vec<PartRows>,
 }
 
-impl Collector {
-    fn of<M: Module>(network: &M, gradients: GradientsParams) -> Vec<Part> {
+impl RowCollector {
+    fn of<M: Module>(network: &M, gradients: GradientsParams) -> Vec<PartRows> {
         let mut collector = Self { gradients, path: Path::default(), parts: Vec::new() };
         network.visit(&mut collector);
         collector.parts
     }
 }
 
-impl ModuleVisitor for Collector {
+impl ModuleVisitor for RowCollector {
     fn enter_module(&mut self, _name: &str, _container_type: &str) {
         self.path.enter();
     }

@@ -12,20 +12,20 @@ use srrf_corrupt::datasets::ShapeSource;
 use srrf_corrupt::{Pair, Severity};
 use srrf_model::is_accelerator;
 
-use crate::checkpoint::{self, Progress};
+use crate::checkpoint::{self, RunProgress};
 use crate::config::TrainConfig;
 use crate::data::TrainingPairs;
 use crate::error::TrainError;
 use crate::export::{Provenance, export};
 use crate::folder::{BEST, LAST, RunFolder};
-use crate::log::{Log, Window, progress_bar, summary, train_line};
+use crate::log::{Log, LossWindow, progress_bar, summary, train_line};
 use crate::options::{Ended, RunOptions};
 use crate::prefetch::{Closing, Prefetch};
 use crate::resources::cpu_seconds;
 use crate::rows::Updater;
 use crate::schedule::Plan;
 use crate::seam::{Losses, Trained};
-use crate::start::{Start, begin, start};
+use crate::start::{StartingPoint, begin, start};
 use crate::step::{PrefetchOf, StepContext, StepError, device_of, gradient, prepare};
 use crate::validate::{CHUNK, Validation, validate};
 use crate::workers::Workers;
@@ -38,7 +38,7 @@ const SAY_EVERY: usize = 500;
 const MOST_SKIPPED_IN_A_ROW: usize = 20;
 
 /// Everything a run holds while it goes.
-struct Run<'a, C: Trained> {
+struct Training<'a, C: Trained> {
     config: &'a TrainConfig<C>,
     options: &'a RunOptions,
     devices: Vec<Device>,
@@ -49,22 +49,22 @@ struct Run<'a, C: Trained> {
     folder: RunFolder,
     model: C::Network,
     updater: Updater,
-    progress: Progress,
+    progress: RunProgress,
     log: Log,
-    clock: Clock,
+    clock: SessionClock,
 }
 
 /// When the session began, and the seconds of the sessions before it.
 #[derive(Clone, Copy)]
-struct Clock {
+struct SessionClock {
     started: Instant,
     wall_before: f64,
     cpu_started: f64,
     cpu_before: f64,
 }
 
-impl Clock {
-    fn new(progress: &Progress) -> Self {
+impl SessionClock {
+    fn new(progress: &RunProgress) -> Self {
         Self {
             started: Instant::now(),
             wall_before: progress.wall_seconds,
@@ -86,7 +86,7 @@ pub fn run<C: Trained>(
     devices: Vec<Device>,
     stop: &AtomicBool,
 ) -> Result<Ended, TrainError> {
-    let run = Run::open(config, options, shapes, devices)?;
+    let run = Training::open(config, options, shapes, devices)?;
     if !on_accelerator(config) {
         return run.go(stop, None);
     }
@@ -117,7 +117,7 @@ fn on_accelerator<C: Trained>(config: &TrainConfig<C>) -> bool {
     config.device.as_deref().is_some_and(is_accelerator)
 }
 
-impl<'a, C: Trained> Run<'a, C> {
+impl<'a, C: Trained> Training<'a, C> {
     fn open(
         config: &'a TrainConfig<C>,
         options: &'a RunOptions,
@@ -129,7 +129,7 @@ impl<'a, C: Trained> Run<'a, C> {
         if devices.len() > shards {
             return Err(TrainError::Devices { devices: devices.len(), shards });
         }
-        let Start { folder, model, optimizer, progress } = start(config, options, device)?;
+        let StartingPoint { folder, model, optimizer, progress } = start(config, options, device)?;
         let pairs = Arc::new(TrainingPairs::new(config, shapes).map_err(StepError::from)?);
         let severity = Severity::try_from(config.keep.validate_severity).unwrap_or(Severity::ALL[2]);
         let held_out = pairs.validation(severity).map_err(StepError::from)?;
@@ -142,7 +142,7 @@ impl<'a, C: Trained> Run<'a, C> {
         let updater = Updater::new(optimizer, &model);
         let log = Log::open(&options.folder, progress.step)
             .map_err(|source| TrainError::Io { path: options.folder.clone(), source })?;
-        let clock = Clock::new(&progress);
+        let clock = SessionClock::new(&progress);
         Ok(Self {
             config,
             options,
@@ -168,7 +168,7 @@ impl<'a, C: Trained> Run<'a, C> {
         let (first, steps) = (run.progress.step, run.plan.steps());
         let end = options.until_step.unwrap_or(usize::MAX).min(steps);
         let bar = progress_bar(steps, first);
-        let mut window = Window::default();
+        let mut window = LossWindow::default();
         let mut saved = Instant::now();
         while run.progress.step < end && !stopped() {
             let step = run.progress.step;
@@ -206,7 +206,7 @@ impl<'a, C: Trained> Run<'a, C> {
         run.save()?;
         bar.abandon();
         let best = options.folder.join(BEST);
-        let Progress { step, skipped, .. } = run.progress;
+        let RunProgress { step, skipped, .. } = run.progress;
         let best = best.exists().then_some(best);
         Ok(Ended { step, done: step - first, complete: step == steps, skipped, best })
     }
@@ -272,7 +272,7 @@ impl<'a, C: Trained> Run<'a, C> {
     }
 
     fn take_time(&mut self) {
-        let Clock { started, wall_before, cpu_started, cpu_before } = self.clock;
+        let SessionClock { started, wall_before, cpu_started, cpu_before } = self.clock;
         self.progress.wall_seconds = wall_before + started.elapsed().as_secs_f64();
         self.progress.cpu_seconds = cpu_before + cpu_seconds() - cpu_started;
     }

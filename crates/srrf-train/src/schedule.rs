@@ -2,7 +2,7 @@
 
 use crate::config::TrainConfig;
 use crate::seam::Trained;
-use crate::stage::{Schedule, StageConfig};
+use crate::stage::{RateSchedule, StageConfig};
 
 /// The steps of a run.
 #[derive(Debug, Clone)]
@@ -53,11 +53,11 @@ impl Plan {
         let (first, end) = (self.bounds[index], self.bounds[index + 1]);
         let done = (step - first) as f64 / (end - first) as f64;
         match &stage.schedule {
-            Schedule::Milestones { at, of_epochs, factor } => {
+            RateSchedule::Milestones { at, of_epochs, factor } => {
                 let passed = at.iter().filter(|&&epoch| done >= epoch / of_epochs).count();
                 stage.learning_rate * factor.powi(passed as i32)
             }
-            Schedule::Cosine { warmup } => {
+            RateSchedule::Cosine { warmup } => {
                 let warm = ((done + 1.0 / (end - first) as f64) / warmup.max(f64::MIN_POSITIVE)).min(1.0);
                 let fall = ((done - warmup) / (1.0 - warmup)).clamp(0.0, 1.0);
                 stage.learning_rate * warm * 0.5 * (1.0 + (std::f64::consts::PI * fall).cos())
@@ -70,13 +70,13 @@ impl Plan {
 mod tests {
     use super::*;
 
-    fn stage(epochs: f64, schedule: Schedule) -> StageConfig<()> {
+    fn stage(epochs: f64, schedule: RateSchedule) -> StageConfig<()> {
         StageConfig { name: "s".into(), epochs, trains: (), learning_rate: 1e-3, schedule }
     }
 
     #[test]
     fn the_papers_milestones_and_their_scaling() {
-        let paper = Schedule::Milestones { at: vec![75.0, 150.0, 200.0], of_epochs: 250.0, factor: 0.1 };
+        let paper = RateSchedule::Milestones { at: vec![75.0, 150.0, 200.0], of_epochs: 250.0, factor: 0.1 };
         for (epochs, scale) in [(250.0, 1.0), (25.0, 0.1)] {
             let stage = stage(epochs, paper.clone());
             let shapes = 320;
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn cosine_rises_and_falls_within_its_stage() {
-        let stage = stage(1.0, Schedule::Cosine { warmup: 0.1 });
+        let stage = stage(1.0, RateSchedule::Cosine { warmup: 0.1 });
         let plan = Plan { bounds: vec![0, 50, 150], batch: 1, shapes: 1 };
         assert_eq!(plan.stage(49), 0);
         assert_eq!(plan.stage(50), 1);

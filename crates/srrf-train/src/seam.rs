@@ -23,7 +23,7 @@ pub type Losses = BTreeMap<&'static str, f64>;
 pub type StageOf<C> = StageConfig<<C as Trained>::Parts>;
 
 /// What a network found on the pairs of a batch, for validation.
-pub struct Found {
+pub struct FoundPoses {
     /// Rotations `[batch, 3, 3]` and translations `[batch, 3]` in network units, for each of [`Trained::ROWS`].
     pub poses: Vec<(Tensor<3>, Tensor<2>)>,
     /// Means over the pairs of other quantities, by name.
@@ -93,7 +93,7 @@ pub trait Trained: NetworkConfig + JsonSchema {
     ///
     /// # Errors
     /// [`CopyError`] where the device does not give its numbers.
-    fn found(&self, network: &Self::Network, batch: TrainingBatch) -> Result<Found, CopyError>;
+    fn found(&self, network: &Self::Network, batch: TrainingBatch) -> Result<FoundPoses, CopyError>;
 }
 
 /// The weighted sum of the loss terms, and their values.

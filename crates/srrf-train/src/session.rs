@@ -7,7 +7,7 @@ use std::time::Duration;
 use srrf_baselines::{BASELINES, BaselineVisitor, LearnedConfig, visit};
 use srrf_model::SrrfConfig;
 
-use crate::config::{ConfigError, Layers, TrainConfig};
+use crate::config::{ConfigError, Layers, TrainConfig, read_layers};
 use crate::data::training_shapes;
 use crate::error::TrainError;
 use crate::nets::baseline::Baseline;
@@ -38,12 +38,12 @@ pub struct Overrides {
     pub say: fn(&str),
 }
 
-/// Trains what the configuration at `path` names, until done, out of time, or told to `stop`.
+/// Trains what the configuration at `path` names (a file, or a run of a list, `list.toml#name`), until done, out of time, or told to `stop`.
 ///
 /// # Errors
 /// [`TrainError`]; the last checkpoint stays usable.
 pub fn train(path: &Path, overrides: &Overrides, stop: &AtomicBool) -> Result<Ended, TrainError> {
-    train_layers(&Layers::read(path)?, overrides, stop)
+    train_layers(&read_layers(path)?, overrides, stop)
 }
 
 /// Trains what configuration files say together; see [`train`].

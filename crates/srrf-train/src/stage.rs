@@ -21,13 +21,13 @@ pub struct StageConfig<P> {
     #[schemars(range(max = 10.0), extend("exclusiveMinimum" = 0.0))]
     pub learning_rate: f64,
     /// How it falls.
-    pub schedule: Schedule,
+    pub schedule: RateSchedule,
 }
 
 /// How the learning rate falls within a stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Schedule {
+pub enum RateSchedule {
     /// Multiplied by `factor` at each milestone. Milestones are epochs of a run of `of_epochs`;
     /// where the stage is shorter or longer they move in proportion.
     Milestones {

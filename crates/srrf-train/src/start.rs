@@ -6,7 +6,7 @@ use burn::tensor::Device;
 use srrf_model::init;
 use srrf_model::weights::{parameters, with_parameters, write_atomically};
 
-use crate::checkpoint::{self, Progress};
+use crate::checkpoint::{self, RunProgress};
 use crate::config::{StartConfig, TrainConfig};
 use crate::error::TrainError;
 use crate::folder::{CONFIG, RunFolder};
@@ -15,7 +15,7 @@ use crate::options::{Existing, RunOptions};
 use crate::seam::Trained;
 
 /// Where a session starts.
-pub(crate) struct Start<C: Trained> {
+pub(crate) struct StartingPoint<C: Trained> {
     /// The folder of the run, which this process has to itself.
     pub folder: RunFolder,
     /// The network.
@@ -23,7 +23,7 @@ pub(crate) struct Start<C: Trained> {
     /// The optimiser.
     pub optimizer: ModuleOptimizer,
     /// Where the run stands.
-    pub progress: Progress,
+    pub progress: RunProgress,
 }
 
 /// Takes the folder and finds where the run stands. Changes nothing of a run that is there.
@@ -31,7 +31,7 @@ pub(crate) fn start<C: Trained>(
     config: &TrainConfig<C>,
     options: &RunOptions,
     device: &Device,
-) -> Result<Start<C>, TrainError> {
+) -> Result<StartingPoint<C>, TrainError> {
     let folder = RunFolder::open(&options.folder)?;
     let found = match options.existing {
         Existing::Restart => None,
@@ -47,10 +47,10 @@ pub(crate) fn start<C: Trained>(
                 Some(start) => starting_model(start, config, device)?,
                 None => init::seeded(config.network.init(device), config.seed),
             };
-            (model.valid(), optimizer(&config.optimizer), Progress::default())
+            (model.valid(), optimizer(&config.optimizer), RunProgress::default())
         }
     };
-    Ok(Start { folder, model, optimizer, progress })
+    Ok(StartingPoint { folder, model, optimizer, progress })
 }
 
 /// Once everything that the run needs is there: moves a run that it replaces aside, and leaves the resolved configuration.
@@ -82,7 +82,7 @@ fn starting_model<C: Trained>(
         StartConfig::Parts(parts) => parts.iter().map(|(part, start)| (part.as_str(), start)).collect(),
     };
     for (part, start) in parts {
-        let wrong = |name: String| TrainError::Start { start: start.clone(), name };
+        let wrong = |name: String| TrainError::StartingPoint { start: start.clone(), name };
         let within = |name: &String| part.is_empty() || name.split('.').next() == Some(part);
         let unread = |source| TrainError::StartFile { start: start.clone(), source };
         let loaded = C::start(start, device).map_err(unread)?;
@@ -98,5 +98,5 @@ fn starting_model<C: Trained>(
         }
     }
     with_parameters(fresh, values)
-        .map_err(|(name, _)| TrainError::Start { start: format!("{start:?}"), name })
+        .map_err(|(name, _)| TrainError::StartingPoint { start: format!("{start:?}"), name })
 }

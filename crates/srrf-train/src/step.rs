@@ -34,10 +34,10 @@ pub struct StepContext<'a, C: Trained = SrrfConfig> {
 }
 
 /// Shards made ahead of their steps.
-pub type PrefetchOf<C> = Prefetch<Result<Prepared<<C as Trained>::Layout>, StepError>>;
+pub type PrefetchOf<C> = Prefetch<Result<PreparedBatch<<C as Trained>::Layout>, StepError>>;
 
 /// A shard on its device, and its layout.
-pub struct Prepared<L> {
+pub struct PreparedBatch<L> {
     /// The pairs.
     pub batch: TrainingBatch,
     /// What the network has to know of their clouds.
@@ -54,17 +54,17 @@ pub fn prepare<C: Trained>(
     pairs: &TrainingPairs,
     number: usize,
     device: &Device,
-) -> Result<Prepared<C::Layout>, StepError> {
+) -> Result<PreparedBatch<C::Layout>, StepError> {
     let count = config.optimizer.shard;
     let first = number * count;
     let pairs = profile::stage("pairs", || pairs.shard(first, count))?;
     let phase = ChaCha8Rng::seed_from_u64(first as u64).random::<f32>();
     let (pairs, poses) = host_pairs(&pairs).ok_or(StepError::Ragged(first))?;
     let layout = profile::stage("layout", || config.network.layout(&stage.trains, &pairs.clouds, phase));
-    Ok(Prepared { batch: TrainingBatch::new(&pairs.upload(device), &poses, phase), layout })
+    Ok(PreparedBatch { batch: TrainingBatch::new(&pairs.upload(device), &poses, phase), layout })
 }
 
-impl<L> Prepared<L> {
+impl<L> PreparedBatch<L> {
     /// With what the device can do ahead of the step; see [`Trained::prefetched`].
     ///
     /// # Errors
@@ -181,7 +181,7 @@ fn shard<C: Trained>(
         Some(prefetch) => prefetch.take(number).ok_or(StepError::Worker)?,
         None => prepare(config, stage, pairs, number, device),
     };
-    let Prepared { batch, layout } = prepared?;
+    let PreparedBatch { batch, layout } = prepared?;
     let (gradients, losses) = profile::stage("network", || {
         config.network.gradient(&config.losses, &stage.trains, network, batch, layout)
     })?;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use srrf_corrupt::Pair;
 use srrf_eval::{MetricError, PoseError, Scores};
 
-use crate::seam::{Found, Trained};
+use crate::seam::{FoundPoses, Trained};
 use crate::step::to_batch;
 use crate::workers::Workers;
 
@@ -50,7 +50,7 @@ pub fn validate<C: Trained>(
     let chunks: Vec<&[Pair]> = pairs.chunks(chunk.max(1)).collect();
     let run = |i: usize| {
         let (pairs, batch) = to_batch(chunks[i], 0.5, device).ok_or(ValidateError::Failed)?;
-        let Found { poses, notes } = config.found(model, batch)?;
+        let FoundPoses { poses, notes } = config.found(model, batch)?;
         let poses = poses.iter().map(|(rotation, translation)| pairs.poses(rotation, translation));
         Ok::<_, ValidateError>((poses.collect::<Result<Vec<_>, _>>()?, notes))
     };

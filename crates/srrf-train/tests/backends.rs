@@ -27,7 +27,7 @@ use srrf_train::data::TrainingPairs;
 use srrf_train::nets::srrf::{Layout, SemTraining, SrrfParts};
 use srrf_train::optimizer::optimizer;
 use srrf_train::rows::Updater;
-use srrf_train::step::{Prepared, StepContext, gradient, prepare, to_batch};
+use srrf_train::step::{PreparedBatch, StepContext, gradient, prepare, to_batch};
 use srrf_train::workers::Workers;
 use srrf_train::{TrainConfig, Trained};
 
@@ -296,7 +296,7 @@ fn what_is_done_ahead_of_a_step_changes_nothing() {
     let (stage, model) = (&config.stages[0], network(&config, &device).valid());
     let gradients = |ahead: bool| {
         let prepared = prepare(&config, stage, &pairs, 1, &device).unwrap();
-        let Prepared { batch, layout } =
+        let PreparedBatch { batch, layout } =
             if ahead { prepared.prefetched(&config, &model).unwrap() } else { prepared };
         assert_eq!(matches!(layout, Layout::Registration(_)), ahead);
         let (all, losses) =

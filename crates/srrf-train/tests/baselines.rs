@@ -9,7 +9,7 @@ use srrf_baselines::{DcpConfig, EquiGsprConfig, LearnedConfig, PanetConfig, Poin
 use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_model::weights::{parameters, read};
 use srrf_model::{NetworkConfig, SrrfConfig};
-use srrf_train::config::{ConfigError, Layers, TrainConfig, read_sweep};
+use srrf_train::config::{ConfigError, Layers, TrainConfig};
 use srrf_train::nets::baseline::Baseline;
 use srrf_train::run::run;
 use srrf_train::{Existing, RunOptions};
@@ -26,14 +26,11 @@ fn configs() -> PathBuf {
 }
 
 /// The configuration that trains `name` has the pairs and the validation of one of SRRF's, and weights that are not too many.
-fn belongs<C: LearnedConfig>(name: &str, file: &str, srrf: (&str, &str)) {
+fn belongs<C: LearnedConfig>(name: &str, file: &str, srrf: &str) {
     let path = configs().join(format!("baselines/{file}.toml"));
     assert_eq!(method_of(&path), C::NAME);
     let ours = TrainConfig::<Baseline<C>>::read(&path).unwrap();
-    let (list, run) = srrf;
-    let runs = read_sweep(&configs().join("../lab/sweeps").join(list)).unwrap();
-    let layers = &runs.iter().find(|known| known.name == run).unwrap().layers;
-    let srrf = <TrainConfig>::resolve(layers).unwrap();
+    let srrf = <TrainConfig>::read(&configs().join("../lab/sweeps").join(srrf)).unwrap();
     assert_eq!((&ours.name, ours.seed), (&name.to_string(), srrf.seed));
     assert_eq!((&ours.data, &ours.draw, &ours.pairs), (&srrf.data, &srrf.draw, &srrf.pairs), "{name}");
     assert_eq!(ours.keep, srrf.keep, "{name}");
@@ -44,12 +41,12 @@ fn belongs<C: LearnedConfig>(name: &str, file: &str, srrf: (&str, &str)) {
 
 #[test]
 fn every_configuration_has_the_pairs_of_srrf() {
-    let first = ("srrf-small.toml", "modelnet-small-2");
+    let first = "srrf-small.toml#modelnet-small-2";
     belongs::<DcpConfig>("dcp", "dcp", first);
     belongs::<DcpConfig>("dcp-v1", "dcp-v1", first);
     belongs::<PointNetLkConfig>("pointnetlk", "pointnetlk", first);
     belongs::<RgmConfig>("rgm", "rgm", first);
-    belongs::<RgmConfig>("rgm", "rgm-2", ("equal.toml", "modelnet-equal-2"));
+    belongs::<RgmConfig>("rgm", "rgm-2", "equal.toml#modelnet-equal-2");
     belongs::<PanetConfig>("panet", "panet", first);
     belongs::<EquiGsprConfig>("equi-gspr", "equi-gspr", first);
     assert_eq!(std::fs::read_dir(configs().join("baselines")).unwrap().count(), 7);

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use serde_json::Value as Json;
 use srrf_baselines::{BASELINES, BaselineVisitor, LearnedConfig, visit};
 use srrf_model::SrrfConfig;
-use srrf_train::config::{Keys, Layers, TrainConfig, key_reference, read_sweep};
+use srrf_train::config::{Keys, Layers, TrainConfig, key_reference, read_layers, read_sweep};
 use srrf_train::nets::baseline::Baseline;
 use srrf_train::{TrainError, Trained};
 
@@ -30,13 +30,7 @@ fn before() -> Vec<Before> {
 }
 
 fn layers(place: &str) -> Layers {
-    match place.split_once('#') {
-        None => Layers::read(&root().join(place)).unwrap(),
-        Some((list, name)) => {
-            let runs = read_sweep(&root().join(list)).unwrap();
-            runs.into_iter().find(|run| run.name == name).unwrap().layers
-        }
-    }
+    read_layers(&root().join(place)).unwrap()
 }
 
 /// Does something with the method of a configuration, of which only the name is known.

@@ -4,7 +4,7 @@
 //! from built-in shapes and, if MODELNET is given, from the shapes of ModelNet40's training split that the
 //! network was validated on; no test shape is looked at. Every fifth pair is held out for the table; the
 //! file `crates/srrf/src/calibration.json` is fitted on all the others.
-#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program that prints")]
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ use srrf_corrupt::crop::{crop, random_direction, visible};
 use srrf_corrupt::datasets::{ShapeSource, Split, held_out, open};
 use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{CorruptionKind, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream};
-use srrf_lab::VALIDATION_SHAPES;
+use srrf_lab::{VALIDATION_SHAPES, keep};
 
 const SEED: u64 = 77_001;
 
@@ -143,14 +143,11 @@ fn pair(
     let pair = synthesizer.pair(shapes, shape, kind.map(|k| (k, severity)), pose, stream).unwrap();
     let (mut source, mut target) = (pair.source, pair.target);
     let mut row = kind.map_or("clean".to_owned(), |k| k.to_string());
-    let keep = |cloud: &mut PointCloud, kept: Vec<usize>| {
-        *cloud = PointCloud::new(kept.into_iter().map(|i| cloud.points()[i]).collect()).unwrap();
-    };
     if rng.random_bool(0.25) {
         row = "cropped".to_owned();
         for cloud in [&mut source, &mut target] {
             let kept = crop(cloud.points(), &random_direction(&mut rng), rng.random_range(0.5..1.0));
-            keep(cloud, kept);
+            keep(cloud, &kept).unwrap();
         }
     } else if rng.random_bool(0.15) {
         // Two cameras some 40 degrees apart.
@@ -161,7 +158,7 @@ fn pair(
         {
             let from = frame * (camera + 0.5 * random_direction(&mut rng)).normalize();
             let kept = visible(cloud.points(), &from, 0.1, 0.15);
-            keep(cloud, kept);
+            keep(cloud, &kept).unwrap();
         }
     }
     (row, source, target, pair.target_from_source)

@@ -1,8 +1,8 @@
 //! Scores the ways to use trained weights on the validation part of the training set: passes,
-//! tokens, inlier test. The test split plays no part. The tables of book/src/experiments come from
+//! tokens, inlier test. The test split plays no part. The tables of the book's experiments come from
 //!
 //! ```sh
-//! cargo run -p srrf-lab --bin inference_choices -- configs/modelnet-gpu-2.toml srrf DATA --rows prior
+//! cargo run -p srrf-lab --bin inference_choices -- lab/sweeps/srrf.toml#modelnet-gpu-2 srrf DATA --rows prior
 //! ```
 
 use std::path::PathBuf;
@@ -10,17 +10,16 @@ use std::path::PathBuf;
 use clap::{Parser, ValueEnum};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
-use srrf_cloud::{PointCloud, Register, Registration, Rigid};
+use serde::Deserialize;
+use srrf_cloud::{Register, Registration, Rigid};
 use srrf_corrupt::crop::{crop, random_direction};
-use srrf_corrupt::{CorruptionKind, Pair, Severity};
+use srrf_corrupt::{CorruptionKind, Pair};
 use srrf_eval::{MetricError, PoseError, Scores};
-use srrf_model::{
-    BranchKind, InferenceConfig, InlierTest, IntegrationConfig, Matches, SrrfConfig, SrrfRegister, device,
-    embedded, keep_freed_memory,
-};
+use srrf_lab::{Failure, held_out_pairs, keep};
+use srrf_model::{BranchKind, SrrfConfig, SrrfRegister, device, embedded, keep_freed_memory};
 use srrf_train::TrainConfig;
-use srrf_train::data::{TrainingPairs, training_shapes};
 use srrf_train::workers::Workers;
+use toml::{Table, Value};
 
 /// Scores the ways to use trained weights on validation pairs.
 #[derive(Parser)]
@@ -37,9 +36,12 @@ struct Arguments {
     /// Share of each cloud that is kept: the farthest points along a direction of its own.
     #[arg(long, default_value_t = 1.0)]
     keep: f64,
+    /// The list of rows.
+    #[arg(long, default_value = "lab/sweeps/inference.toml")]
+    list: PathBuf,
     /// Which rows to score.
     #[arg(long, value_enum, default_value = "all")]
-    rows: Rows,
+    rows: TablePart,
     /// Score each branch alone in all passes, instead of the branches of the whole network, whose passes start
     /// from the fused pose.
     #[arg(long)]
@@ -50,8 +52,9 @@ struct Arguments {
 }
 
 /// Parts of the table.
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Rows {
+#[derive(Clone, Copy, PartialEq, ValueEnum, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum TablePart {
     /// All of the below; an hour and more.
     All,
     /// As the weights' own header says.
@@ -64,180 +67,69 @@ enum Rows {
     Prior,
 }
 
-/// An inlier test, and the factor of the skeleton branch's ratio.
-type Test = (InlierTest, f64);
-const NEAREST: Test = (InlierTest::Nearest, 1.0);
-const BOTH: Test = (InlierTest::BothWays, 1.0);
-const SOFT: Test = (InlierTest::SoftMatch, 1.0);
-/// The same test for both, where the skeleton's ratio counts less.
-const FAIR: Test = (InlierTest::BothWays, 0.8);
-
-/// Passes, tokens in them, tokens in the last one, inlier test with the thresholds of the dense and of the skeleton
-/// branch, sharpness.
-type Choice = (usize, usize, usize, Test, f64, f64, f64);
-
-const MEAN: &[Choice] = &[
-    (1, 256, 256, NEAREST, 0.05, 0.05, 1.0),
-    (1, 256, 256, NEAREST, 0.05, 0.05, 16.0),
-    (1, 256, 256, BOTH, 0.05, 0.04, 16.0),
-    (2, 256, 256, NEAREST, 0.05, 0.05, 1.0),
-    (2, 256, 256, NEAREST, 0.05, 0.05, 16.0),
-    (2, 256, 256, NEAREST, 0.05, 0.05, 64.0),
-    (2, 256, 256, NEAREST, 0.03, 0.03, 16.0),
-    (2, 256, 256, NEAREST, 0.02, 0.02, 16.0),
-    (2, 256, 256, NEAREST, 0.08, 0.08, 16.0),
-    (2, 256, 256, SOFT, 0.05, 0.1, 1.0),
-    (3, 256, 256, NEAREST, 0.05, 0.05, 16.0),
-    (2, 256, 256, BOTH, 0.05, 0.05, 4.0),
-    (2, 256, 256, BOTH, 0.05, 0.05, 16.0),
-    (2, 256, 256, BOTH, 0.05, 0.05, 64.0),
-    (2, 256, 256, BOTH, 0.05, 0.04, 16.0),
-    (2, 512, 512, NEAREST, 0.05, 0.05, 16.0),
-    (2, 512, 512, NEAREST, 0.05, 0.04, 16.0),
-    (2, 512, 512, SOFT, 0.05, 0.05, 4.0),
-    (2, 512, 512, BOTH, 0.05, 0.05, 4.0),
-    (2, 512, 512, BOTH, 0.05, 0.05, 16.0),
-    (2, 512, 512, BOTH, 0.05, 0.047, 16.0),
-    (2, 512, 512, BOTH, 0.05, 0.045, 16.0),
-    (2, 512, 512, BOTH, 0.05, 0.04, 16.0),
-    (2, 512, 512, BOTH, 0.05, 0.03, 16.0),
-    (2, 512, 512, BOTH, 0.05, 0.04, 64.0),
-    (2, 512, 512, BOTH, 0.05, 0.03, 64.0),
-    (3, 512, 512, BOTH, 0.05, 0.04, 16.0),
-    (2, 768, 768, BOTH, 0.05, 0.04, 16.0),
-    (2, 512, 1024, BOTH, 0.05, 0.03, 64.0),
-];
-
-const BEST: &[Choice] = &[
-    (1, 256, 256, BOTH, 0.05, 0.03, 64.0),
-    (1, 512, 512, BOTH, 0.05, 0.03, 64.0),
-    (2, 256, 512, BOTH, 0.05, 0.03, 64.0),
-    (2, 256, 1024, BOTH, 0.05, 0.03, 64.0),
-    (2, 512, 512, BOTH, 0.05, 0.03, 64.0),
-    (2, 512, 1024, BOTH, 0.05, 0.03, 64.0),
-    (2, 512, 1024, BOTH, 0.05, 0.05, 16.0),
-    (2, 512, 1024, BOTH, 0.03, 0.03, 16.0),
-    (2, 512, 1024, BOTH, 0.03, 0.03, 64.0),
-    (2, 512, 1024, BOTH, 0.03, 0.02, 64.0),
-    (2, 512, 1024, BOTH, 0.03, 0.01, 256.0),
-    (2, 512, 768, BOTH, 0.05, 0.03, 64.0),
-    (3, 256, 512, BOTH, 0.05, 0.03, 64.0),
-    (3, 256, 1024, BOTH, 0.05, 0.03, 64.0),
-    (3, 256, 1024, BOTH, 0.03, 0.03, 16.0),
-    (3, 256, 1024, BOTH, 0.02, 0.015, 256.0),
-    (3, 128, 1024, BOTH, 0.05, 0.03, 64.0),
-    (4, 256, 1024, BOTH, 0.05, 0.03, 64.0),
-    (5, 256, 1024, BOTH, 0.05, 0.03, 64.0),
-    (3, 256, 1024, BOTH, 0.03, 0.01, 256.0),
-];
-
-/// With the deviation of the prior.
-const PRIOR: &[(f64, Choice)] = &[
-    (0.1, (2, 512, 1024, BOTH, 0.03, 0.01, 256.0)),
-    (0.15, (2, 512, 1024, BOTH, 0.03, 0.01, 256.0)),
-    (0.15, (2, 512, 1024, FAIR, 0.03, 0.03, 64.0)),
-    (0.15, (3, 512, 1024, FAIR, 0.03, 0.03, 64.0)),
-    (0.1, (3, 256, 1024, BOTH, 0.03, 0.01, 256.0)),
-    (0.1, (4, 256, 1024, BOTH, 0.03, 0.01, 256.0)),
-    (0.1, (4, 256, 1024, FAIR, 0.03, 0.03, 64.0)),
-    (0.15, (4, 256, 1024, FAIR, 0.03, 0.03, 64.0)),
-];
-
 /// One row: how the network is used.
-struct Row {
+#[derive(Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InferenceRow {
+    /// Which part of the table it belongs to.
+    part: TablePart,
+    /// Tokens of the dense branch.
     tokens: usize,
-    inference: InferenceConfig,
-    integration: IntegrationConfig,
+    /// The `inference` of the header.
+    inference: Table,
+    /// The `integration` of the header.
+    integration: Table,
 }
 
-impl Row {
-    fn new(
-        (
-            passes,
-            tokens,
-            last_tokens,
-            (test, skeleton_weight),
-            dense_threshold,
-            skeleton_threshold,
-            sharpness,
-        ): Choice,
-        last_matches: Matches,
-        prior: Option<f64>,
-    ) -> Self {
-        let inference = InferenceConfig { passes, last_tokens: Some(last_tokens), last_matches, prior };
-        let integration = IntegrationConfig {
-            test,
-            dense_threshold,
-            skeleton_threshold,
-            sharpness,
-            skeleton_weight,
-            standard_errors: None,
-        };
-        Self { tokens, inference, integration }
+/// The list of rows.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InferenceList {
+    rows: Vec<InferenceRow>,
+}
+
+impl InferenceRow {
+    /// The row of the weights' own header.
+    fn of_header(header: &SrrfConfig) -> Result<Self, Failure> {
+        let table = |key: &str| Ok::<_, Failure>(Table::try_from(header)?.get(key).cloned());
+        let part =
+            |key: &str| Ok::<_, Failure>(table(key)?.and_then(|v| v.try_into().ok()).unwrap_or_default());
+        let (inference, integration) = (part("inference")?, part("integration")?);
+        Ok(Self { part: TablePart::Header, tokens: header.dense.tokens, inference, integration })
     }
 
-    fn of_header(header: &SrrfConfig) -> Self {
-        Self {
-            tokens: header.dense.tokens,
-            inference: header.inference.clone(),
-            integration: header.integration.clone(),
-        }
-    }
-
-    fn all(wanted: Rows, header: &SrrfConfig) -> Vec<Self> {
-        let of = |part: Rows| wanted == part || wanted == Rows::All;
-        let mean = MEAN.iter().map(|&choice| Self::new(choice, Matches::Mean, None));
-        let best = BEST.iter().map(|&choice| Self::new(choice, Matches::Best, None));
-        let prior =
-            PRIOR.iter().map(|&(deviation, choice)| Self::new(choice, Matches::Best, Some(deviation)));
-        let mean = mean.filter(|_| of(Rows::Mean));
-        let header = of(Rows::Header).then(|| Self::of_header(header));
-        header
-            .into_iter()
-            .chain(mean)
-            .chain(best.filter(|_| of(Rows::Best)))
-            .chain(prior.filter(|_| of(Rows::Prior)))
-            .collect()
+    /// The header with what the row changes.
+    fn applied(&self, header: &SrrfConfig) -> Result<SrrfConfig, Failure> {
+        let mut changed = Table::try_from(header)?;
+        changed.insert("inference".into(), Value::Table(self.inference.clone()));
+        changed.insert("integration".into(), Value::Table(self.integration.clone()));
+        let mut changed: SrrfConfig = Value::Table(changed).try_into()?;
+        changed.dense.tokens = self.tokens;
+        Ok(changed)
     }
 
     fn describe(&self) -> String {
-        let InferenceConfig { passes, last_tokens, last_matches, prior } = &self.inference;
-        let IntegrationConfig {
-            test,
-            dense_threshold,
-            skeleton_threshold,
-            sharpness,
-            skeleton_weight,
-            standard_errors,
-        } = &self.integration;
-        let ahead = standard_errors.map(|z| format!(", ahead by {z} standard errors")).unwrap_or_default();
-        let less = if *skeleton_weight < 1.0 { format!(", times {skeleton_weight}") } else { String::new() };
-        let near = prior.map(|deviation| format!(", prior {deviation}")).unwrap_or_default();
-        let (tokens, last_tokens) = (self.tokens, last_tokens.unwrap_or(self.tokens));
-        format!(
-            "{passes} | {tokens} | {last_tokens} {last_matches:?}{near} | {test:?} {dense_threshold} \
-             {skeleton_threshold}{less}{ahead} | {sharpness}"
-        )
+        let words = |table: &Table| {
+            table.iter().map(|(key, value)| format!("{key} {value}")).collect::<Vec<_>>().join(", ")
+        };
+        format!("{} | {} | {}", self.tokens, words(&self.inference), words(&self.integration))
     }
 }
 
-#[allow(clippy::print_stdout, reason = "an example that prints a table")]
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+#[allow(clippy::print_stdout, reason = "a program that prints a table")]
+fn main() -> Result<(), Failure> {
     keep_freed_memory();
     let arguments = Arguments::parse();
     let config = <TrainConfig>::read(&arguments.config)?;
-    let pairs = TrainingPairs::new(&config, training_shapes(&config, arguments.data.as_deref(), None)?)?;
-    let mut held_out: Vec<Pair> = Vec::new();
-    for &severity in &arguments.severities {
-        held_out.extend(pairs.validation(Severity::try_from(severity)?)?);
-    }
+    let data = arguments.data.as_deref();
+    let (description, mut held_out) = held_out_pairs(&config, data, &[config.seed], &arguments.severities)?;
     if arguments.keep < 1.0 {
         held_out.iter_mut().enumerate().try_for_each(|(i, pair)| cut(pair, arguments.keep, i as u64))?;
     }
     let workers = Workers::new(std::thread::available_parallelism().map_or(1, usize::from))?;
     println!(
         "{}; {} pairs at severities {:?}, {} of each cloud kept; RMSE / MAE / median of R in degrees",
-        pairs.description(),
+        description,
         held_out.len(),
         arguments.severities,
         arguments.keep
@@ -247,17 +139,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         false => &["dense", "skeleton", "fused", "the better branch"],
     };
     println!(
-        "| passes | tokens | last pass | inlier test | sharpness | {} |\n|{}",
+        "| tokens | inference | integration | {} |\n|{}",
         columns.join(" | "),
-        "---|".repeat(5 + columns.len())
+        "---|".repeat(3 + columns.len())
     );
     let device = device("flex")?;
     let opened = embedded::open(&arguments.weights, &device)?;
-    for row in Row::all(arguments.rows, &opened.config) {
+    let list: InferenceList = toml::from_str(&std::fs::read_to_string(&arguments.list)?)?;
+    let rows = std::iter::once(InferenceRow::of_header(&opened.config)?).chain(list.rows);
+    for row in rows.filter(|row| arguments.rows == TablePart::All || arguments.rows == row.part) {
         let mut loaded = opened.clone();
         loaded.model.dense = loaded.model.dense.with_tokens(row.tokens);
-        loaded.config.integration = row.integration.clone();
-        loaded.config.inference = row.inference.clone();
+        loaded.config = row.applied(&opened.config)?;
         let network = || SrrfRegister::new(loaded.clone(), device.clone());
         let errors = match arguments.alone {
             true => {
@@ -272,7 +165,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let name = kind.map_or("clean", |kind: CorruptionKind| kind.name());
                 let of_kind = |i: usize| held_out[i].corruption.map(|(kind, _)| kind) == kind;
                 if (0..held_out.len()).any(of_kind) {
-                    println!("| {name} | | | | | {} |", scores(&errors, of_kind)?);
+                    println!("| {name} | | | {} |", scores(&errors, of_kind)?);
                 }
             }
         }
@@ -281,17 +174,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// Keeps a share of both clouds, each on one side of a plane of its own.
-fn cut(pair: &mut Pair, keep: f64, seed: u64) -> Result<(), srrf_cloud::CloudError> {
+fn cut(pair: &mut Pair, share: f64, seed: u64) -> Result<(), srrf_cloud::CloudError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for cloud in [&mut pair.source, &mut pair.target] {
-        let kept = crop(cloud.points(), &random_direction(&mut rng), keep);
-        *cloud = PointCloud::new(kept.into_iter().map(|i| cloud.points()[i]).collect())?;
+        let kept = crop(cloud.points(), &random_direction(&mut rng), share);
+        keep(cloud, &kept)?;
     }
     Ok(())
 }
 
 /// The poses of an answer that are scored, one a column; the truth is there to choose by.
-type Columns<const N: usize> = fn(&Registration, &Rigid) -> [Option<Rigid>; N];
+type AnswerColumns<const N: usize> = fn(&Registration, &Rigid) -> [Option<Rigid>; N];
 
 /// The pose itself.
 fn own(answer: &Registration, _: &Rigid) -> [Option<Rigid>; 1] {
@@ -311,8 +204,8 @@ fn errors_of<const N: usize>(
     method: &SrrfRegister,
     pairs: &[Pair],
     workers: &Workers,
-    columns: Columns<N>,
-) -> Result<Vec<Vec<PoseError>>, Box<dyn std::error::Error>> {
+    columns: AnswerColumns<N>,
+) -> Result<Vec<Vec<PoseError>>, Failure> {
     let answers = workers
         .map(pairs.len(), |i| {
             let answer = method.register(&pairs[i].source, &pairs[i].target).ok()?;

@@ -7,7 +7,7 @@
 //! these shapes (default: each); every other one of the 192 gives its place to a built-in shape, so an even number takes none of those.
 //! Beside the corruptions there are the rows `crop` (each cloud keeps 60 to 100 % of itself, on its own side of a plane) and `view`
 //! (what two cameras some 40 degrees apart see).
-#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program that prints")]
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ use srrf_corrupt::crop::{crop, random_direction, visible};
 use srrf_corrupt::datasets::{ShapeSource, Split, held_out, open};
 use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{CorruptionKind, Pair, PairConfig, PairSynthesizer, PoseDraw, Sampling, Severity, Stream};
-use srrf_lab::VALIDATION_SHAPES;
+use srrf_lab::{VALIDATION_SHAPES, keep};
 use srrf_model::{SrrfRegister, device, embedded};
 use srrf_refine::{Metric, RefineConfig, RefineTarget, Verdict};
 
@@ -155,7 +155,7 @@ fn partial(row: &str, pair: &mut Pair, stream: Stream) {
         } else {
             visible(cloud.points(), &(frame * (camera + 0.5 * side).normalize()), 0.1, 0.15)
         };
-        *cloud = PointCloud::new(kept.into_iter().map(|i| cloud.points()[i]).collect()).unwrap();
+        keep(cloud, &kept).unwrap();
     }
 }
 

@@ -25,14 +25,14 @@ use srrf_refine::{RefineConfig, Verdict, refine};
 
 /// Errors of one method on one row.
 #[derive(Default)]
-struct Row {
+struct ErrorRow {
     euler_deg: Vec<f64>,
     angle_deg: Vec<f64>,
     shift: Vec<f64>,
     seconds: f64,
 }
 
-impl Row {
+impl ErrorRow {
     fn add(&mut self, found: &Rigid, truth: &Rigid) {
         let angles = |pose: &Rigid| EulerXyz::from_matrix(&pose.rotation).to_deg();
         for (a, b) in angles(found).iter().zip(angles(truth)) {
@@ -90,7 +90,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     variants.iter().for_each(|(name, _)| print!(" {name:28} |"));
     println!(" rigid deformed start | correlation, that of normals, median: 5%, 50%, 95%");
     for kind in CorruptionKind::ALL.into_iter().filter(|k| k.name().contains(&only)) {
-        let mut rows: Vec<Row> = (0..=variants.len()).map(|_| Row::default()).collect();
+        let mut rows: Vec<ErrorRow> = (0..=variants.len()).map(|_| ErrorRow::default()).collect();
         let mut verdicts = [0; 3];
         let mut structure = [const { Vec::new() }; 3];
         for k in 0..count {

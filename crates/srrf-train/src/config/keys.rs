@@ -19,7 +19,8 @@ const HEAD: &str = "# Keys of a training configuration
 
 A configuration is a TOML file for `srrf-train --config FILE`. `extends = \"base.toml\"` at its top takes the keys of another file, named
 relative to this one: tables merge key by key, every other value, lists as well, replaces what was there. A key that is not
-listed here is an error, and so is a number out of its range. `[]` stands for each entry of a list. Every run writes the resolved
+listed here is an error, and so is a number out of its range. `--config LIST.toml#NAME` takes one of the `[[runs]]` of a list
+(`lab/sweeps/`): what stands above them holds for each, and each says what it changes. `[]` stands for each entry of a list. Every run writes the resolved
 configuration into its folder, as `config.toml`.
 ";
 
@@ -28,12 +29,12 @@ configuration into its folder, as `config.toml`.
 pub struct Keys {
     /// The `method`.
     pub method: &'static str,
-    rows: Vec<Row>,
+    rows: Vec<KeyRow>,
 }
 
 /// One key.
 #[derive(Debug, Clone, PartialEq)]
-struct Row {
+struct KeyRow {
     key: String,
     kind: String,
     default: String,
@@ -58,7 +59,7 @@ impl Keys {
     fn table(&self, text: &mut String, wanted: impl Fn(&str) -> bool) {
         text.push_str("\n| key | type | default | range | what it is |\n|---|---|---|---|---|\n");
         for row in self.rows.iter().filter(|row| wanted(&row.key)) {
-            let Row { key, kind, default, range, sentence } = row;
+            let KeyRow { key, kind, default, range, sentence } = row;
             let _ = writeln!(text, "| `{key}` | {kind} | {default} | {range} | {sentence} |");
         }
     }
@@ -90,7 +91,7 @@ pub fn key_reference() -> String {
 }
 
 /// The rows of all keys below a schema.
-fn collect(root: &Json, schema: &Json, at: &str, rows: &mut Vec<Row>) {
+fn collect(root: &Json, schema: &Json, at: &str, rows: &mut Vec<KeyRow>) {
     let schema = resolved(root, schema);
     let required = |key: &str| {
         let listed = schema.get("required").and_then(Json::as_array);
@@ -107,7 +108,7 @@ fn collect(root: &Json, schema: &Json, at: &str, rows: &mut Vec<Row>) {
             None if required(key) => "must be given".into(),
             None => "none".into(),
         };
-        rows.push(Row {
+        rows.push(KeyRow {
             key: key_at.clone(),
             kind: kind_of(root, inner),
             default,
@@ -124,7 +125,7 @@ fn collect(root: &Json, schema: &Json, at: &str, rows: &mut Vec<Row>) {
 }
 
 /// The rows below a key: of a table, of the entries of a list, of a table with free names.
-fn below(root: &Json, schema: &Json, at: &str, rows: &mut Vec<Row>) {
+fn below(root: &Json, schema: &Json, at: &str, rows: &mut Vec<KeyRow>) {
     collect(root, schema, at, rows);
     if let Some(items) = schema.get("items") {
         below(root, resolved(root, items), &format!("{at}[]"), rows);

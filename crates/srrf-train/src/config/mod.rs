@@ -13,5 +13,5 @@ pub use error::ConfigError;
 pub use extends::Layers;
 pub use keys::{Keys, key_reference};
 pub use sections::{DataConfig, DataSource, DrawConfig, KeepConfig, OptimizerConfig, OptimizerKind};
-pub use sweep::{SweepRun, read_sweep};
+pub use sweep::{SweepRun, read_layers, read_sweep};
 pub use train_config::{StartConfig, TrainConfig};

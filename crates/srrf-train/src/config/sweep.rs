@@ -1,4 +1,4 @@
-//! Lists of runs: a TOML file whose `[[runs]]` each say what they change.
+//! Lists of runs: a TOML file whose `[[runs]]` each say what they change. `list.toml#name` is one of them.
 //!
 //! What stands above the list holds for every run. A run, or the whole list, names by `extends` what it changes, relative to
 //! the file of the list.
@@ -17,6 +17,30 @@ pub struct SweepRun {
     pub name: String,
     /// What it is made of.
     pub layers: Layers,
+}
+
+/// The configuration at `path`: a file, or a run of a list, `list.toml#name`.
+///
+/// # Errors
+/// [`ConfigError`] where a file cannot be read, is no TOML, or has no such run.
+pub fn read_layers(path: &Path) -> Result<Layers, ConfigError> {
+    let text = path.to_string_lossy();
+    let (list, name) = match text.split_once('#') {
+        Some((list, name)) if !path.exists() => (Path::new(list), Some(name)),
+        _ => (path, None),
+    };
+    if name.is_none() {
+        let layers = Layers::read(list)?;
+        if !layers.merged().contains_key("runs") {
+            return Ok(layers);
+        }
+    }
+    let runs = read_sweep(list)?;
+    let names: Vec<&str> = runs.iter().map(|run| run.name.as_str()).collect();
+    let why = format!("is a list: name one by {}#NAME, of {}", list.display(), names.join(", "));
+    let found = runs.iter().find(|run| Some(run.name.as_str()) == name);
+    let found = found.map(|run| run.layers.clone());
+    found.ok_or_else(|| ConfigError::Value { path: list.into(), key: "runs".into(), why })
 }
 
 /// The runs of a list, in order.
@@ -82,6 +106,13 @@ mod tests {
                 ("b".into(), table("name = \"b\"\nseed = 2\ndraw = { clean = 0.2, turned = 0.7 }")),
             ]
         );
+        let one = |name: &str| read_layers(&folder.path().join(name));
+        assert_eq!(one("list.toml#b").unwrap().merged()["seed"].as_integer(), Some(2));
+        assert_eq!(one("base.toml").unwrap().merged()["seed"].as_integer(), Some(1));
+        for name in ["list.toml", "list.toml#c"] {
+            let why = one(name).unwrap_err().to_string();
+            assert!(why.contains("list.toml#NAME") && why.contains("a, b"), "{why}");
+        }
         let refused = |text: &str| read_sweep(&write("wrong.toml", text)).unwrap_err().to_string();
         assert!(refused("extends = \"base.toml\"\n").contains("[[runs]]"));
         assert!(refused("[[runs]]\nseed = 4\n").contains("runs[0].name"));

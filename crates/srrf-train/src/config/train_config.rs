@@ -12,6 +12,7 @@ use super::error::ConfigError;
 use super::extends::Layers;
 use super::ranges::out_of_range;
 use super::sections::{DataConfig, DataSource, DrawConfig, KeepConfig, OptimizerConfig};
+use super::sweep::read_layers;
 use crate::seam::{StageOf, Trained};
 
 /// A training run of the network of sizes `C`.
@@ -66,12 +67,12 @@ pub enum StartConfig {
 }
 
 impl<C: Trained> TrainConfig<C> {
-    /// Reads and checks a file.
+    /// Reads and checks a file, or a run of a list, `list.toml#name`.
     ///
     /// # Errors
     /// [`ConfigError`], which names the file and the key.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        Self::resolve(&Layers::read(path)?)
+        Self::resolve(&read_layers(path)?)
     }
 
     /// Resolves and checks what files say together.

@@ -12,7 +12,7 @@ use srrf_model::ops::{CopyError, HostClouds};
 use srrf_model::weights::{WeightsError, parse, read};
 use srrf_model::{NetworkConfig, TrainingBatch, WrongSize};
 
-use crate::seam::{Found, LossTerms, Losses, Trained};
+use crate::seam::{FoundPoses, LossTerms, Losses, Trained};
 
 /// A learned baseline as the loop sees it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -93,8 +93,8 @@ impl<C: LearnedConfig> Trained for Baseline<C> {
         terms.finish(&network)
     }
 
-    fn found(&self, network: &C::Network, batch: TrainingBatch) -> Result<Found, CopyError> {
+    fn found(&self, network: &C::Network, batch: TrainingBatch) -> Result<FoundPoses, CopyError> {
         let pose = self.0.pose(network, batch.source, batch.target)?;
-        Ok(Found { poses: vec![(pose.rotation, pose.translation)], notes: Vec::new() })
+        Ok(FoundPoses { poses: vec![(pose.rotation, pose.translation)], notes: Vec::new() })
     }
 }

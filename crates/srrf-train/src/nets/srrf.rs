@@ -13,7 +13,7 @@ use srrf_model::{
     skeleton_loss, spread, transform,
 };
 
-use crate::seam::{Found, LossTerms, Losses, StageOf, Trained};
+use crate::seam::{FoundPoses, LossTerms, Losses, StageOf, Trained};
 
 /// Weights of the losses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -167,7 +167,7 @@ impl Trained for SrrfConfig {
         terms.finish(&fork)
     }
 
-    fn found(&self, network: &Srrf, batch: TrainingBatch) -> Result<Found, CopyError> {
+    fn found(&self, network: &Srrf, batch: TrainingBatch) -> Result<FoundPoses, CopyError> {
         let TrainingBatch { source, target, rotation, translation, phase } = batch;
         let output = network.forward(&self.integration, source, target, phase)?;
         let poses = vec![
@@ -183,7 +183,7 @@ impl Trained for SrrfConfig {
             ("skeleton_chamfer", chamfer(posed, target.clone())?.into_scalar::<f64>()),
             ("skeleton_spread", spread(target).into_scalar::<f64>()),
         ];
-        Ok(Found { poses, notes })
+        Ok(FoundPoses { poses, notes })
     }
 }
 

@@ -4,7 +4,9 @@ use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 
-use crate::{Arguments, Failure};
+use srrf_lab::Failure;
+
+use crate::Arguments;
 
 /// Runs `job`, and gives its result and the seconds it took.
 fn clock<T>(job: impl FnOnce() -> T) -> (T, f64) {

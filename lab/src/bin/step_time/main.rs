@@ -10,7 +10,6 @@
 mod clock;
 mod clouds;
 
-use std::error::Error;
 use std::path::PathBuf;
 
 use burn::module::Module;
@@ -18,6 +17,7 @@ use burn::tensor::Device;
 use clap::{Parser, ValueEnum};
 use serde_json::{Map, Value, json};
 use srrf_corrupt::Pair;
+use srrf_lab::Failure;
 use srrf_model::{PairBatch, Srrf, init, keep_freed_memory};
 use srrf_train::TrainConfig;
 use srrf_train::data::TrainingPairs;
@@ -31,9 +31,6 @@ use srrf_train::workers::Workers;
 use crate::clock::{median, memory_mib, summary, timed};
 use crate::clouds::Stored;
 
-/// Any error, across threads.
-type Failure = Box<dyn Error + Send + Sync>;
-
 /// Which points carry tokens.
 const PHASE: f32 = 0.5;
 
@@ -45,7 +42,7 @@ struct Arguments {
     config: PathBuf,
     /// What is timed.
     #[arg(long, value_enum, default_value = "registration_step")]
-    figure: Figure,
+    figure: TimedFigure,
     /// Where the network runs.
     #[arg(long, default_value = "flex")]
     device: String,
@@ -62,7 +59,7 @@ struct Arguments {
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "snake_case")]
-enum Figure {
+enum TimedFigure {
     /// A step of the registration stage: pairs, forward, losses, backward, clipping, AdamW.
     RegistrationStep,
     /// A step of the skeleton stage.
@@ -75,7 +72,7 @@ enum Figure {
     Forward8,
 }
 
-#[allow(clippy::print_stdout, reason = "an example that prints its result")]
+#[allow(clippy::print_stdout, reason = "a program that prints its result")]
 fn main() -> Result<(), Failure> {
     keep_freed_memory();
     let arguments = Arguments::parse();
@@ -84,10 +81,10 @@ fn main() -> Result<(), Failure> {
     let bench = Bench::new(config, &arguments.device)?;
     let start_mib = memory_mib("VmHWM:");
     let mut found = match arguments.figure {
-        Figure::RegistrationStep => bench.steps(bench.stage(true)?, &arguments)?,
-        Figure::SkeletonStep => bench.steps(bench.stage(false)?, &arguments)?,
-        Figure::Forward1 => bench.forward(1, &arguments)?,
-        Figure::Forward8 => bench.forward(8, &arguments)?,
+        TimedFigure::RegistrationStep => bench.steps(bench.stage(true)?, &arguments)?,
+        TimedFigure::SkeletonStep => bench.steps(bench.stage(false)?, &arguments)?,
+        TimedFigure::Forward1 => bench.forward(1, &arguments)?,
+        TimedFigure::Forward8 => bench.forward(8, &arguments)?,
     };
     found.insert("start_mib".into(), json!(start_mib));
     found.insert("peak_mib".into(), json!(memory_mib("VmHWM:")));
