@@ -82,7 +82,7 @@ fn starting_model<C: Trained>(
         StartConfig::Parts(parts) => parts.iter().map(|(part, start)| (part.as_str(), start)).collect(),
     };
     for (part, start) in parts {
-        let wrong = |name: String| TrainError::StartingPoint { start: start.clone(), name };
+        let wrong = |name: String| TrainError::Start { start: start.clone(), name };
         let within = |name: &String| part.is_empty() || name.split('.').next() == Some(part);
         let unread = |source| TrainError::StartFile { start: start.clone(), source };
         let loaded = C::start(start, device).map_err(unread)?;
@@ -98,5 +98,5 @@ fn starting_model<C: Trained>(
         }
     }
     with_parameters(fresh, values)
-        .map_err(|(name, _)| TrainError::StartingPoint { start: format!("{start:?}"), name })
+        .map_err(|(name, _)| TrainError::Start { start: format!("{start:?}"), name })
 }

@@ -15,7 +15,7 @@ use nalgebra::Matrix3;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
-use srrf_cloud::{EulerXyz, PointCloud, Register, Rigid, Solid};
+use srrf_cloud::{EulerXyz, Register, Rigid, Solid};
 use srrf_corrupt::crop::{crop, random_direction, visible};
 use srrf_corrupt::datasets::{ShapeSource, Split, held_out, open};
 use srrf_corrupt::shapes::ProceduralShapes;
