@@ -178,7 +178,7 @@ pub enum Axis {
 
 /// `--up`
 #[derive(Debug, Clone, Copy, Args)]
-pub struct Up {
+pub struct UpAxis {
     /// The axis.
     #[arg(long, value_enum, value_name = value::UP, default_value_t = Axis::Z, help = help::UP)]
     pub up: Axis,

@@ -33,7 +33,7 @@ impl Mixture {
             Self::Both(first, second) => {
                 Box::new(Both([corruption(first, variants), corruption(second, variants)]))
             }
-            Self::Local(kind) => Box::new(Local(corruption(kind, variants))),
+            Self::Local(kind) => Box::new(HalfOf(corruption(kind, variants))),
         }
     }
 }
@@ -70,9 +70,9 @@ impl Corruption for Both {
     }
 }
 
-struct Local(Box<dyn Corruption>);
+struct HalfOf(Box<dyn Corruption>);
 
-impl Corruption for Local {
+impl Corruption for HalfOf {
     fn name(&self) -> &'static str {
         "local"
     }

@@ -33,7 +33,7 @@ const NEW: [Colour; 2] = [[208, 68, 16], [250, 186, 140]];
 const GONE: Colour = [238, 150, 150];
 
 /// What a sheet shows.
-pub struct Sheet<'a> {
+pub struct ContactSheet<'a> {
     /// The clean cloud, canonical frame.
     pub cloud: &'a PointCloud,
     /// What the cloud is, for the title.
@@ -58,7 +58,7 @@ struct Frame {
     depth: f64,
 }
 
-impl Sheet<'_> {
+impl ContactSheet<'_> {
     /// Draws the sheet.
     ///
     /// # Errors

@@ -26,7 +26,7 @@ pub use reading::{Reading, ReadingArgs};
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true
 )]
-pub struct Cli {
+pub struct CorruptCli {
     #[command(subcommand)]
     command: Option<Verb>,
     #[command(flatten)]
@@ -43,14 +43,14 @@ enum Verb {
 
 /// The program's arguments, for tests that compare the programs.
 pub fn command() -> clap::Command {
-    Cli::command()
+    CorruptCli::command()
 }
 
 /// Does what was asked.
 ///
 /// # Errors
 /// [`Failure`], with its exit code.
-pub fn run(cli: Cli) -> Result<ExitCode, Failure> {
+pub fn run(cli: CorruptCli) -> Result<ExitCode, Failure> {
     interrupt::install()?;
     match cli.command {
         Some(Verb::Sheet(args)) => sheet::sheet(&args),

@@ -5,12 +5,12 @@ use std::process::ExitCode;
 
 use clap::Args;
 use rand::{SeedableRng, rngs::ChaCha8Rng, seq::index};
-use srrf_args::flags::{Quiet, Seed, Up, help, value};
+use srrf_args::flags::{Quiet, Seed, UpAxis, help, value};
 use srrf_args::numbers::{real, whole};
 use srrf_args::{Failure, Output, files};
 use srrf_cloud::PointCloud;
 
-use super::draw::Sheet;
+use super::draw::ContactSheet;
 use super::reading::ReadingArgs;
 use crate::datasets::ShapeSource;
 use crate::shapes::ProceduralShapes;
@@ -47,7 +47,7 @@ pub struct SheetArgs {
     reading: ReadingArgs,
 
     #[command(flatten)]
-    up: Up,
+    up: UpAxis,
 
     /// Where the eye is, in degrees around that axis
     #[arg(
@@ -82,7 +82,7 @@ pub fn sheet(args: &SheetArgs) -> Result<ExitCode, Failure> {
         }
         None => (built_in(args.points, &mut rng)?, format!("built-in {BUILT_IN}")),
     };
-    let sheet = Sheet {
+    let sheet = ContactSheet {
         cloud: &cloud,
         title: format!("{name}, {} points, seed {}", cloud.len(), args.seed.seed),
         variants: args.reading.variants(),

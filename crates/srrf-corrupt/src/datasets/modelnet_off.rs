@@ -27,11 +27,11 @@ const FRAME_SEED: u64 = 40;
 /// points of the surface: all samplings of a mesh share one frame.
 #[derive(Debug)]
 pub(super) struct ModelnetOff {
-    meshes: Catalogue<Mesh>,
+    meshes: Catalogue<MeshFile>,
 }
 
 #[derive(Debug)]
-pub(super) struct Mesh {
+pub(super) struct MeshFile {
     path: PathBuf,
     frame: OnceLock<UnitSphere>,
 }
@@ -77,7 +77,7 @@ pub(super) fn open(folder: &Path, split: Split) -> Result<ModelnetOff, SourceErr
     for (class, inner) in &classes {
         for path in meshes_in(inner)? {
             let id = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            meshes.push(Entry::new(id, class.clone(), Mesh { path, frame: OnceLock::new() }));
+            meshes.push(Entry::new(id, class.clone(), MeshFile { path, frame: OnceLock::new() }));
         }
     }
     if meshes.is_empty() {
@@ -93,7 +93,7 @@ pub(super) fn open(folder: &Path, split: Split) -> Result<ModelnetOff, SourceErr
     Ok(ModelnetOff { meshes: Catalogue::new(description, meshes) })
 }
 
-impl Mesh {
+impl MeshFile {
     fn load(&self, index: usize) -> Result<(Triangles, UnitSphere), SourceError> {
         let bytes =
             fs::read(&self.path).map_err(|source| IoError::Read { path: self.path.clone(), source })?;
@@ -135,15 +135,15 @@ impl Mesh {
 }
 
 impl Listed for ModelnetOff {
-    type Item = Mesh;
+    type Item = MeshFile;
 
-    fn catalogue(&self) -> &Catalogue<Mesh> {
+    fn catalogue(&self) -> &Catalogue<MeshFile> {
         &self.meshes
     }
 
     fn draw(
         &self,
-        mesh: &Entry<Mesh>,
+        mesh: &Entry<MeshFile>,
         index: usize,
         count: usize,
         rng: &mut ChaCha8Rng,
@@ -154,7 +154,7 @@ impl Listed for ModelnetOff {
 
     fn draw_two(
         &self,
-        mesh: &Entry<Mesh>,
+        mesh: &Entry<MeshFile>,
         index: usize,
         count: usize,
         rng: &mut ChaCha8Rng,

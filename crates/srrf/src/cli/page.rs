@@ -20,7 +20,7 @@ pub struct PageArgs {
     unit: String,
 
     #[command(flatten)]
-    up: srrf_args::flags::Up,
+    up: srrf_args::flags::UpAxis,
 }
 
 impl PageArgs {
