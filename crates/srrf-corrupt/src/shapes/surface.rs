@@ -66,7 +66,7 @@ impl Form {
 }
 
 #[derive(Debug, Clone)]
-struct Part {
+struct SurfacePart {
     form: Form,
     shape_from_part: Rigid,
     part_from_shape: Rigid,
@@ -74,7 +74,7 @@ struct Part {
     squared_radius: f64,
 }
 
-impl Part {
+impl SurfacePart {
     fn contains(&self, p: &Vector3<f64>) -> bool {
         (p - self.centre).norm_squared() < self.squared_radius && {
             let local = self.part_from_shape.rotation * p + self.part_from_shape.translation;
@@ -86,7 +86,7 @@ impl Part {
 /// A union of parts.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Surface {
-    parts: Vec<Part>,
+    parts: Vec<SurfacePart>,
     running_area: Vec<f64>,
 }
 
@@ -101,7 +101,7 @@ impl Surface {
         let centre = shape_from_part.rotation * centre + shape_from_part.translation;
         let part_from_shape = shape_from_part.inverse();
         self.running_area.push(self.running_area.last().copied().unwrap_or(0.0) + area);
-        self.parts.push(Part {
+        self.parts.push(SurfacePart {
             form,
             shape_from_part,
             part_from_shape,
