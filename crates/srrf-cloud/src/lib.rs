@@ -29,7 +29,7 @@ pub use frame::PairFrame;
 pub use neighbours::KnnIndex;
 pub use normals::estimate_normals;
 pub use register::{
-    Branch, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, SoftMatch,
+    Branch, BranchKind, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, SoftMatch,
 };
 pub use right::{RIGHT_IN_WORDS, RIGHT_RADIUS_SHARE, RIGHT_ROTATION_DEG, is_right};
 pub use rigid::Rigid;

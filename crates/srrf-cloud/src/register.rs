@@ -1,5 +1,7 @@
 //! The seam that every registration method implements.
 
+use std::fmt;
+
 use crate::{CloudError, PointCloud, Rigid, Solid};
 
 /// Why two clouds could not be registered.
@@ -19,11 +21,42 @@ pub enum RegisterError {
     NoPose(String),
 }
 
+/// Which of the poses that a method finds on its way to its answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum BranchKind {
+    /// By the points of the clouds themselves.
+    Dense,
+    /// By the skeletons.
+    Skeleton,
+    /// Before the refinement.
+    Unrefined,
+}
+
+impl BranchKind {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Dense, Self::Skeleton, Self::Unrefined];
+
+    /// Suffix of the method's name under which the pose is scored, such as `dense`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Dense => "dense",
+            Self::Skeleton => "skeleton",
+            Self::Unrefined => "unrefined",
+        }
+    }
+}
+
+impl fmt::Display for BranchKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
 /// One of several poses that a method finds on its way to its answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Branch {
-    /// Suffix of the method's name under which this pose is scored, such as `dense`.
-    pub name: &'static str,
+    /// Which one.
+    pub kind: BranchKind,
     /// The pose of this branch.
     pub target_from_source: Rigid,
     /// Share of the branch's correspondences that agree with its pose, in [0, 1].

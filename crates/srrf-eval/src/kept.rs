@@ -59,7 +59,7 @@ impl KeptAnswer {
             branches: found
                 .branches
                 .iter()
-                .map(|b| KeptBranch { name: b.name.to_owned(), pose: b.target_from_source })
+                .map(|b| KeptBranch { name: b.kind.to_string(), pose: b.target_from_source })
                 .collect(),
             iterations: found.iterations,
             converged: found.converged,
@@ -130,7 +130,7 @@ mod pose {
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
-    use srrf_cloud::{Branch, EulerXyz, Skeleton, Skeletons};
+    use srrf_cloud::{Branch, BranchKind, EulerXyz, Skeleton, Skeletons};
 
     use super::*;
 
@@ -143,7 +143,7 @@ mod tests {
         let mut broken = pose;
         broken.translation.y = f64::NEG_INFINITY;
         let found = Registration {
-            branches: vec![Branch { name: "left", target_from_source: broken, inlier_ratio: 0.5 }],
+            branches: vec![Branch { kind: BranchKind::Dense, target_from_source: broken, inlier_ratio: 0.5 }],
             skeletons: Some(Skeletons {
                 source: Skeleton { points: vec![[0.1, 0.2, 0.3]], radii: Vec::new() },
                 target: Skeleton { points: vec![[1.0; 3], [2.0; 3]], radii: Vec::new() },

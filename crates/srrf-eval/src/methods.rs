@@ -10,7 +10,7 @@ use srrf_baselines::{BASELINES, BaselineVisitor, LearnedConfig, LearnedRegister}
 use srrf_classical::{Fgr, FpfhRansac, Icp, IcpConfig, IcpPlane, IcpRobust, IcpTrimmed, Identity};
 use srrf_cloud::Register;
 use srrf_model::weights::{self, LoadedModel, WeightsError};
-use srrf_model::{BranchKind, DeviceError, NetworkConfig, SrrfRegister, embedded};
+use srrf_model::{NetworkBranch, DeviceError, NetworkConfig, SrrfRegister, embedded};
 use srrf_refine::{RefineConfig, Refined};
 
 use crate::rows::TableRow;
@@ -215,9 +215,9 @@ const SRRF: &[MethodEntry] = &[
             Ok(ReadyMethod::new(register).with_weights(weights))
         })
     },
-    MethodEntry::new("srrf-dense-alone", Srrf, OnRequest, |context, _| alone(context, BranchKind::Dense)),
+    MethodEntry::new("srrf-dense-alone", Srrf, OnRequest, |context, _| alone(context, NetworkBranch::Dense)),
     MethodEntry::new("srrf-skeleton-alone", Srrf, OnRequest, |context, _| {
-        alone(context, BranchKind::Skeleton)
+        alone(context, NetworkBranch::Skeleton)
     }),
     MethodEntry::new("srrf+refine", Srrf, InTables, |context, _| {
         let (register, weights) = srrf(context)?;
@@ -303,7 +303,7 @@ fn srrf(context: &MethodContext) -> Result<(SrrfRegister, String), SetupError> {
 }
 
 /// One branch of it in all passes.
-fn alone(context: &MethodContext, branch: BranchKind) -> Result<ReadyMethod, SetupError> {
+fn alone(context: &MethodContext, branch: NetworkBranch) -> Result<ReadyMethod, SetupError> {
     let (register, weights) = srrf(context)?;
     Ok(ReadyMethod::new(register.alone(branch)).with_weights(weights))
 }

@@ -241,7 +241,7 @@ impl Run<'_> {
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::{Branch, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, Solid};
+    use srrf_cloud::{Branch, BranchKind, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, Solid};
     use srrf_corrupt::{CorruptionKind, PairConfig, Severity};
 
     use super::*;
@@ -264,8 +264,9 @@ mod tests {
             }
             let mut broken = Rigid::identity();
             broken.rotation[(0, 0)] = f64::NAN;
-            let branch = |name, target_from_source| Branch { name, target_from_source, inlier_ratio: 0.0 };
-            let branches = vec![branch("left", Rigid::identity()), branch("right", broken)];
+            let branch = |kind, target_from_source| Branch { kind, target_from_source, inlier_ratio: 0.0 };
+            let branches =
+                vec![branch(BranchKind::Dense, Rigid::identity()), branch(BranchKind::Skeleton, broken)];
             // Skeletons that agree under no pose but the identity.
             let skeleton = Skeleton { points: vec![[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]], radii: Vec::new() };
             let skeletons = Some(Skeletons { source: skeleton.clone(), target: skeleton });

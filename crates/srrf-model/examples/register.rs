@@ -15,15 +15,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let device = device("flex")?;
     let loaded = embedded::load_default(&device)?;
-    let sharpness = loaded.config.integration.sharpness;
     let found = SrrfRegister::new(loaded, device).register(&source, &target)?;
 
     println!("target_from_source:{}", found.target_from_source.to_matrix4());
     println!("rotation error: {:.2} degrees", found.target_from_source.angle_to_deg(&truth));
     for branch in &found.branches {
-        println!("{}: gamma {:.3}", branch.name, branch.inlier_ratio);
+        println!("{}: gamma {:.3}", branch.kind, branch.inlier_ratio);
     }
-    let [dense, skeleton] = [0, 1].map(|i| found.branches[i].inlier_ratio.powf(sharpness));
-    println!("lambda {:.3}", dense / (dense + skeleton));
+    if let Some(lambda) = found.lambda {
+        println!("lambda {lambda:.3}");
+    }
     Ok(())
 }

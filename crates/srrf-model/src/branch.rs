@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::confidence::Confidence;
 use crate::inference::Matches;
-use crate::integration::BranchPose;
+use crate::integration::PosedMatches;
 use crate::matching::{MatchingConfig, SoftMatching};
 use crate::ops::{CopyError, HostClouds, RowNumbers, rows_at, token_rows};
 use crate::pfi::{Pfi, PfiConfig};
@@ -39,8 +39,8 @@ pub struct BranchConfig {
 
 impl BranchConfig {
     /// A new branch.
-    pub fn init(&self, device: &Device) -> Branch {
-        Branch {
+    pub fn init(&self, device: &Device) -> RegistrationBranch {
+        RegistrationBranch {
             sfe: self.sfe.init(device),
             pfi: self.pfi.init(self.sfe.output_width(), device),
             matching: self.matching.init(device),
@@ -57,7 +57,7 @@ impl BranchConfig {
 
 /// SFE -> PFI -> soft matching -> SVD. Weights are shared between source and target.
 #[derive(Module, Debug)]
-pub struct Branch {
+pub struct RegistrationBranch {
     sfe: Sfe,
     pfi: Pfi,
     matching: SoftMatching,
@@ -119,8 +119,8 @@ pub struct BranchOutput {
 
 impl BranchOutput {
     /// The view that the integration takes.
-    pub fn pose(&self) -> BranchPose<'_> {
-        BranchPose {
+    pub fn pose(&self) -> PosedMatches<'_> {
+        PosedMatches {
             rotation: &self.rotation,
             translation: &self.translation,
             points: &self.source_points,
@@ -129,7 +129,7 @@ impl BranchOutput {
     }
 }
 
-impl Branch {
+impl RegistrationBranch {
     /// Replaces the number of tokens (0 for all points): more of them cost time and gain accuracy,
     /// also when the branch was trained with fewer.
     pub fn with_tokens(mut self, tokens: usize) -> Self {
@@ -166,7 +166,7 @@ impl Branch {
         BranchLayout::new(clouds, self.tokens, self.sfe.neighbours(), phase)
     }
 
-    /// As [`Branch::forward`], of clouds whose layout is known, and with a prior on where matches lie.
+    /// As [`RegistrationBranch::forward`], of clouds whose layout is known, and with a prior on where matches lie.
     ///
     /// # Shapes
     /// - `clouds`: `[2 batch, points, 3]`, sources and then targets

@@ -74,7 +74,7 @@ pub struct Fusion {
 }
 
 /// A branch's pose with the correspondences it came from.
-pub struct BranchPose<'a> {
+pub struct PosedMatches<'a> {
     /// `[batch, 3, 3]`.
     pub rotation: &'a Tensor<3>,
     /// `[batch, 3]`.
@@ -96,12 +96,12 @@ impl IntegrationConfig {
     /// [`CopyError`] where the device does not give its numbers.
     pub fn fuse(
         &self,
-        dense: BranchPose<'_>,
-        skeleton: BranchPose<'_>,
+        dense: PosedMatches<'_>,
+        skeleton: PosedMatches<'_>,
         source: &Tensor<3>,
         target: &Tensor<3>,
     ) -> Result<Fusion, CopyError> {
-        let near = |branch: &BranchPose<'_>, threshold| self.near(branch, threshold, source, target);
+        let near = |branch: &PosedMatches<'_>, threshold| self.near(branch, threshold, source, target);
         let (dense_inlier_ratio, skeleton_inlier_ratio, ahead) = match self.test {
             InlierTest::SoftMatch => {
                 let (c, s) = (
@@ -149,7 +149,7 @@ impl IntegrationConfig {
     /// of that and the share of target points with a source point near.
     fn near(
         &self,
-        pose: &BranchPose<'_>,
+        pose: &PosedMatches<'_>,
         threshold: f64,
         source: &Tensor<3>,
         target: &Tensor<3>,
@@ -166,7 +166,7 @@ impl IntegrationConfig {
     }
 }
 
-impl BranchPose<'_> {
+impl PosedMatches<'_> {
     /// `points` moved by the pose.
     fn host_clouds(&self, points: &Tensor<3>) -> Result<HostClouds, CopyError> {
         let (rotation, translation) = (self.rotation.clone().detach(), self.translation.clone().detach());
@@ -176,8 +176,8 @@ impl BranchPose<'_> {
 
 /// Of each correspondence of a branch, whether it agrees with a pose: `|R x_i + t - yhat_i| < threshold`.
 fn agreeing(
-    branch: &BranchPose<'_>,
-    pose: &BranchPose<'_>,
+    branch: &PosedMatches<'_>,
+    pose: &PosedMatches<'_>,
     threshold: f64,
 ) -> Result<Vec<Vec<bool>>, CopyError> {
     let moved = pose.host_clouds(branch.points)?;

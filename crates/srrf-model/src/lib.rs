@@ -36,13 +36,13 @@ mod training_batch;
 pub mod weights;
 
 pub use batch::{HostPairs, PairBatch, network_frame};
-pub use branch::{Branch, BranchConfig, BranchLayout, BranchOutput};
+pub use branch::{BranchConfig, BranchLayout, BranchOutput, RegistrationBranch};
 pub use device::{
     DeviceError, NAMES as DEVICE_NAMES, built_in as built_in_devices, device, devices, is_accelerator,
     kind as device_kind,
 };
 pub use inference::{InferenceConfig, Matches};
-pub use integration::{BranchPose, Fusion, InlierTest, IntegrationConfig};
+pub use integration::{Fusion, InlierTest, IntegrationConfig, PosedMatches};
 pub use losses::{
     SkeletonLoss, SkeletonLossConfig, chamfer, correspondence_loss, matching_loss, registration_loss,
     skeleton_loss, spread,
@@ -55,8 +55,8 @@ pub use pfi::{Pfi, PfiConfig};
 pub use prior::PositionPrior;
 pub use procrustes::{nearest_rotation, procrustes, transform, weighted_procrustes};
 pub use register::{SrrfRegister, subsample};
-pub use sem::{LevelConfig, Sem, SemConfig, SemLayout, Skeleton};
+pub use sem::{LevelConfig, Sem, SemConfig, SemLayout, SkeletonBatch};
 pub use sfe::{Neighbourhood, Sfe, SfeConfig};
 pub use sizes::{NetworkConfig, WrongSize};
-pub use srrf::{BranchKind, Srrf, SrrfConfig, SrrfLayout, SrrfOutput};
+pub use srrf::{NetworkBranch, Srrf, SrrfConfig, SrrfLayout, SrrfOutput};
 pub use training_batch::TrainingBatch;

@@ -3,8 +3,8 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use srrf_cloud::{
-    Branch, PairFrame, PointCloud, Register, RegisterError, Registration, Rigid, Skeleton, Skeletons,
-    SoftMatch, Solid,
+    Branch, BranchKind, PairFrame, PointCloud, Register, RegisterError, Registration, Rigid, Skeleton,
+    Skeletons, SoftMatch, Solid,
 };
 
 use crate::batch::PairBatch;
@@ -13,8 +13,8 @@ use crate::inference::InferenceConfig;
 use crate::integration::IntegrationConfig;
 use crate::ops::{CopyError, even_subsample, to_host};
 use crate::prior::PositionPrior;
-use crate::sem;
-use crate::srrf::{BranchKind, Srrf};
+use crate::sem::SkeletonBatch;
+use crate::srrf::{NetworkBranch, Srrf};
 use crate::weights::LoadedModel;
 
 /// Which points carry tokens at inference: the middle of each step along the curve.
@@ -30,7 +30,7 @@ pub struct SrrfRegister {
     /// Standard deviation of the prior on where matches lie, in the passes after the first one.
     prior: Option<f64>,
     /// The only branch that runs; both and their integration if none.
-    alone: Option<BranchKind>,
+    alone: Option<NetworkBranch>,
     device: Device,
     /// Largest number of points that the network sees of a cloud; larger clouds are subsampled
     /// evenly. It was trained with 1,024.
@@ -64,7 +64,7 @@ impl SrrfRegister {
     /// One branch in all passes, without the other and without the integration: what the fused pose is to be
     /// compared with. Its name is `srrf-dense-alone` or `srrf-skeleton-alone`. (The branches of a [`Registration`] of the
     /// whole network are no such thing: in all passes but the first they start from the fused pose.)
-    pub fn alone(self, branch: BranchKind) -> Self {
+    pub fn alone(self, branch: NetworkBranch) -> Self {
         Self { alone: Some(branch), ..self }
     }
 
@@ -98,17 +98,18 @@ impl SrrfRegister {
         let answers = found
             .enumerate()
             .map(|(i, ((source, target), matches))| {
-                let branch = |name, pose: &[Option<Rigid>], ratio: &[f64]| {
-                    Some(Branch { name, target_from_source: pose[i]?, inlier_ratio: ratio[i] })
+                let branch = |kind, pose: &[Option<Rigid>], ratio: &[f64]| {
+                    Some(Branch { kind, target_from_source: pose[i]?, inlier_ratio: ratio[i] })
                 };
                 let branches = vec![
-                    branch("dense", &dense, &output.fused.dense_inlier_ratio)?,
-                    branch("skeleton", &skeleton, &output.fused.skeleton_inlier_ratio)?,
+                    branch(BranchKind::Dense, &dense, &output.fused.dense_inlier_ratio)?,
+                    branch(BranchKind::Skeleton, &skeleton, &output.fused.skeleton_inlier_ratio)?,
                 ];
                 Some(Registration {
                     branches,
                     skeletons: Some(Skeletons { source, target }),
                     matches,
+                    lambda: Some(output.fused.lambda[i]),
                     ..Registration::from_pose(fused[i]?)
                 })
             })
@@ -121,8 +122,8 @@ impl Register for SrrfRegister {
     fn name(&self) -> &str {
         match self.alone {
             None => "srrf",
-            Some(BranchKind::Dense) => "srrf-dense-alone",
-            Some(BranchKind::Skeleton) => "srrf-skeleton-alone",
+            Some(NetworkBranch::Dense) => "srrf-dense-alone",
+            Some(NetworkBranch::Skeleton) => "srrf-skeleton-alone",
         }
     }
 
@@ -151,7 +152,7 @@ impl Register for SrrfRegister {
 
 /// The skeletons of a batch in the coordinates of their clouds.
 fn skeletons(
-    found: &sem::Skeleton,
+    found: &SkeletonBatch,
     frames: &[PairFrame],
     undo: fn(&PairFrame, &[f64; 3]) -> [f64; 3],
 ) -> Result<Vec<Skeleton>, CopyError> {

@@ -156,7 +156,7 @@ impl SemLayout {
 
 /// The skeleton of each cloud.
 #[derive(Debug, Clone)]
-pub struct Skeleton {
+pub struct SkeletonBatch {
     /// Skeleton points `S`: `[clouds, skeleton_points, 3]`.
     pub points: Tensor<3>,
     /// Radii of their spheres, `R = W^T D`: `[clouds, skeleton_points]`.
@@ -175,7 +175,7 @@ impl Sem {
     ///
     /// # Errors
     /// [`CopyError`] where the device does not give its numbers.
-    pub fn forward(&self, clouds: Tensor<3>) -> Result<Skeleton, CopyError> {
+    pub fn forward(&self, clouds: Tensor<3>) -> Result<SkeletonBatch, CopyError> {
         let layout = self.layout(&HostClouds::read(&clouds)?);
         self.forward_with(clouds, &layout)
     }
@@ -189,7 +189,7 @@ impl Sem {
     ///
     /// # Errors
     /// [`CopyError`] where the device does not give its numbers.
-    pub fn forward_with(&self, clouds: Tensor<3>, layout: &SemLayout) -> Result<Skeleton, CopyError> {
+    pub fn forward_with(&self, clouds: Tensor<3>, layout: &SemLayout) -> Result<SkeletonBatch, CopyError> {
         let (samples, features) = self.encode(clouds, layout);
         let [batch, n, channels] = features.dims();
 
@@ -211,7 +211,7 @@ impl Sem {
         let points = weights.clone().transpose().matmul(samples.clone()); // S = W^T X*, Eq. (5)
         let distances = nearest_distance(samples.clone(), points.clone())?; // D, Eq. (6)
         let radii = weights.clone().transpose().matmul(distances.unsqueeze_dim::<3>(2)); // R = W^T D
-        Ok(Skeleton { points, radii: radii.squeeze_dim::<2>(2), weights, samples })
+        Ok(SkeletonBatch { points, radii: radii.squeeze_dim::<2>(2), weights, samples })
     }
 
     /// The sampled points `X*` and their contextual features.
@@ -273,7 +273,7 @@ impl Level {
     }
 }
 
-impl Skeleton {
+impl SkeletonBatch {
     /// The skeletons of the sources and those of the targets, of a batch that holds both in turn.
     pub fn halves(self) -> (Self, Self) {
         let batch = self.points.dims()[0] / 2;

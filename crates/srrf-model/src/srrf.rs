@@ -6,12 +6,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_cloud::profile::stage;
 
-use crate::branch::{Branch, BranchConfig, BranchLayout, BranchOutput};
+use crate::branch::{BranchConfig, BranchLayout, BranchOutput, RegistrationBranch};
 use crate::inference::InferenceConfig;
 use crate::integration::{Fusion, IntegrationConfig};
 use crate::ops::{CopyError, HostClouds};
 use crate::prior::PositionPrior;
-use crate::sem::{Sem, SemConfig, SemLayout, Skeleton};
+use crate::sem::{Sem, SemConfig, SemLayout, SkeletonBatch};
 use crate::timing::timed;
 
 /// Sizes of the whole network.
@@ -54,9 +54,9 @@ pub struct Srrf {
     /// Skeleton extraction.
     pub sem: Sem,
     /// The branch on the corrupted clouds.
-    pub dense: Branch,
+    pub dense: RegistrationBranch,
     /// The branch on the skeletons.
-    pub skeleton: Branch,
+    pub skeleton: RegistrationBranch,
 }
 
 /// The layout of a batch for the whole network; the skeleton branch has its own, once there are
@@ -75,7 +75,7 @@ pub struct SrrfLayout {
 
 /// One of the two branches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BranchKind {
+pub enum NetworkBranch {
     /// The branch on the corrupted clouds.
     Dense,
     /// The branch on the skeletons.
@@ -86,9 +86,9 @@ pub enum BranchKind {
 #[derive(Debug, Clone)]
 pub struct SrrfOutput {
     /// Skeletons `X^s`.
-    pub source_skeleton: Skeleton,
+    pub source_skeleton: SkeletonBatch,
     /// Skeletons `Y^s`.
-    pub target_skeleton: Skeleton,
+    pub target_skeleton: SkeletonBatch,
     /// `{R_c, t_c}` and its soft matches.
     pub dense: BranchOutput,
     /// `{R_s, t_s}` and its soft matches.
@@ -154,7 +154,7 @@ impl Srrf {
     /// [`CopyError`] where the device does not give its numbers.
     pub fn alone(
         &self,
-        which: BranchKind,
+        which: NetworkBranch,
         source: Tensor<3>,
         target: Tensor<3>,
         phase: f32,
@@ -162,8 +162,8 @@ impl Srrf {
     ) -> Result<BranchOutput, CopyError> {
         let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
         let (branch, clouds) = match which {
-            BranchKind::Dense => (&self.dense, clouds),
-            BranchKind::Skeleton => {
+            NetworkBranch::Dense => (&self.dense, clouds),
+            NetworkBranch::Skeleton => {
                 let layout = self.sem.layout(&HostClouds::read(&clouds)?);
                 (&self.skeleton, self.sem.forward_with(clouds, &layout)?.detached_points())
             }
@@ -185,7 +185,7 @@ impl Srrf {
         source: Tensor<3>,
         target: Tensor<3>,
         layout: &SrrfLayout,
-    ) -> Result<((Skeleton, Skeleton), BranchOutput, BranchOutput), CopyError> {
+    ) -> Result<((SkeletonBatch, SkeletonBatch), BranchOutput, BranchOutput), CopyError> {
         let clouds = Tensor::cat(vec![source, target], 0); // [2 batch, points, 3]
         // (1) Skeletal extraction, Eq. (5) and (6).
         let skeletons =

@@ -6,7 +6,7 @@ use burn::tensor::{Device, Tensor};
 use common::{Numbers, difference, row_major, tensor, tiny, values};
 use nalgebra::{Matrix3, Vector3};
 use srrf_cloud::Rigid;
-use srrf_model::{BranchPose, Fusion, InlierTest, IntegrationConfig, SrrfOutput, init};
+use srrf_model::{Fusion, InlierTest, IntegrationConfig, PosedMatches, SrrfOutput, init};
 
 const BATCH: usize = 3;
 const POINTS: usize = 61;
@@ -134,8 +134,8 @@ fn fuse(
     let cloud = |points: &[f64]| tensor::<3>(points, [1, points.len() / 3, 3], &device);
     config
         .fuse(
-            BranchPose { rotation: &dense.0, translation: &dense.1, points: &dense.2, matches: &dense.3 },
-            BranchPose {
+            PosedMatches { rotation: &dense.0, translation: &dense.1, points: &dense.2, matches: &dense.3 },
+            PosedMatches {
                 rotation: &skeleton.0,
                 translation: &skeleton.1,
                 points: &skeleton.2,

@@ -6,7 +6,7 @@ mod common;
 use burn::tensor::{Device, Tensor};
 use common::{Numbers, difference, tensor, tiny, values};
 use srrf_model::{
-    BranchConfig, Pfi, Sem, Sfe, Skeleton, SkeletonLoss, SkeletonLossConfig, SoftMatching, init,
+    BranchConfig, Pfi, Sem, Sfe, SkeletonBatch, SkeletonLoss, SkeletonLossConfig, SoftMatching, init,
     nearest_distance, skeleton_loss, spread,
 };
 
@@ -48,7 +48,7 @@ fn combined(weights: &[f64], rows: &[f64], skeleton_points: usize, channels: usi
 #[test]
 fn skeletons_are_convex_combinations_of_sampled_points() {
     let x = clouds(1, CLOUDS, POINTS);
-    let Skeleton { points, radii, weights, samples } = sem().forward(x.clone()).unwrap();
+    let SkeletonBatch { points, radii, weights, samples } = sem().forward(x.clone()).unwrap();
     assert_eq!(samples.dims(), [CLOUDS, 23, 3]);
     assert_eq!(weights.dims(), [CLOUDS, 23, 19]);
     assert_eq!(points.dims(), [CLOUDS, 19, 3]);
@@ -151,7 +151,7 @@ fn distribution_distance_over_the_spread_does_not_reward_shrinking() {
         distribution_over_spread: 0.7,
         index_match: 0.0,
     };
-    let skeleton = |seed: u64, factor: f64| Skeleton {
+    let skeleton = |seed: u64, factor: f64| SkeletonBatch {
         points: clouds(seed, 1, 19) * factor,
         radii: Tensor::zeros([1, 19], &device),
         weights: Tensor::zeros([1, 1, 19], &device),

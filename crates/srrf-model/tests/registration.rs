@@ -11,7 +11,8 @@ use common::{Numbers, difference, tiny, values};
 use nalgebra::Vector3;
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, SoftMatch};
 use srrf_model::{
-    BranchKind, InferenceConfig, Matches, PairBatch, SrrfConfig, SrrfRegister, init, network_frame, weights,
+    InferenceConfig, InlierTest, Matches, NetworkBranch, PairBatch, SrrfConfig, SrrfRegister, embedded, init,
+    network_frame, weights,
 };
 
 /// Far from the origin, as map coordinates in metres are.
@@ -116,8 +117,11 @@ fn network() -> SrrfRegister {
 }
 
 fn network_with(inference: InferenceConfig) -> SrrfRegister {
+    with_config(SrrfConfig { inference, ..tiny() })
+}
+
+fn with_config(config: SrrfConfig) -> SrrfRegister {
     let device = Device::flex();
-    let config = SrrfConfig { inference, ..tiny() };
     let model = init::seeded(config.init(&device), 12);
     let bytes = weights::to_safetensors(&model, &config, "tiny", &BTreeMap::new()).unwrap();
     SrrfRegister::new(weights::from_safetensors(&bytes, "memory", &device).unwrap(), device)
@@ -133,7 +137,7 @@ fn answers_hold_both_branches() {
     assert_eq!(network.name(), "srrf");
     let answer = network.register(&cloud(13, 61), &cloud(14, 67)).unwrap();
     assert_eq!(answer.iterations, 2, "two passes by default");
-    assert_eq!(answer.branches.iter().map(|b| b.name).collect::<Vec<_>>(), ["dense", "skeleton"]);
+    assert_eq!(answer.branches.iter().map(|b| b.kind.name()).collect::<Vec<_>>(), ["dense", "skeleton"]);
     for branch in &answer.branches {
         assert!((0.0..=1.0).contains(&branch.inlier_ratio));
         assert!((branch.target_from_source.rotation.determinant() - 1.0).abs() < 1e-12);
@@ -145,12 +149,62 @@ fn answers_hold_both_branches() {
     assert_eq!(network.register(&cloud(13, 61), &cloud(14, 67)).unwrap(), answer);
 }
 
+/// The fused pose is the blend of the branches' by the lambda that is reported: the rotation the projection of the blended
+/// rotations, and the place of the source's mean, about which the network works, the blend of its places.
+fn is_the_blend(answer: &Registration, source: &PointCloud) {
+    let lambda = answer.lambda.unwrap();
+    assert!((0.0..=1.0).contains(&lambda));
+    let [dense, skeleton] = [0, 1].map(|i| answer.branches[i].target_from_source);
+    let blended =
+        Rigid::nearest_rotation(&(dense.rotation * lambda + skeleton.rotation * (1.0 - lambda))).unwrap();
+    assert!((blended - answer.target_from_source.rotation).norm() < 1e-5);
+    let mean: [f64; 3] = source.centroid().into();
+    let place = |pose: &Rigid| Vector3::from(pose.apply(&mean));
+    let wanted = place(&dense) * lambda + place(&skeleton) * (1.0 - lambda);
+    assert!((wanted - place(&answer.target_from_source)).norm() < 1e-5);
+    assert!(dense.angle_to_deg(&skeleton) > 0.1, "branches that agree would hide a wrong lambda");
+}
+
+#[test]
+fn lambda_is_the_number_that_the_pose_was_made_with() {
+    let device = Device::flex();
+    let (source, target) = (cloud(13, 61), cloud(14, 61));
+    let mut lambdas = Vec::new();
+    for passes in [1, 2, 3] {
+        for (test, standard_errors, sharpness) in [
+            (InlierTest::SoftMatch, None, 1.0),
+            (InlierTest::Nearest, None, 2.0),
+            (InlierTest::BothWays, None, 1.0),
+            (InlierTest::Common, None, 1.0),
+            (InlierTest::Common, Some(1.0), 1.0),
+        ] {
+            let mut config = tiny();
+            config.inference.passes = passes;
+            let fusion = &mut config.integration;
+            (fusion.test, fusion.standard_errors, fusion.sharpness) = (test, standard_errors, sharpness);
+            (fusion.dense_threshold, fusion.skeleton_threshold) = (0.4, 0.3);
+            let answer = with_config(config).register(&source, &target).unwrap();
+            is_the_blend(&answer, &source);
+            lambdas.push(answer.lambda.unwrap());
+        }
+    }
+    assert!(lambdas.iter().any(|l| *l > 0.01 && *l < 0.49 || *l > 0.51 && *l < 0.99), "{lambdas:?}");
+
+    for name in embedded::names() {
+        let loaded = embedded::load(name, &device).unwrap().unwrap();
+        let answer = SrrfRegister::new(loaded, device.clone()).register(&source, &target).unwrap();
+        is_the_blend(&answer, &source);
+    }
+    let alone = network().alone(NetworkBranch::Dense).register(&source, &target).unwrap();
+    assert_eq!(alone.lambda, None);
+}
+
 /// A branch alone is what one gets by hand: its own pose of one pass, applied, and its own pose of the next.
 #[test]
 fn a_branch_alone_starts_each_pass_from_its_own_pose() {
     let (source, target) = (cloud(13, 61), cloud(14, 61));
     let once = network_with(InferenceConfig::paper());
-    for (i, which) in [BranchKind::Dense, BranchKind::Skeleton].into_iter().enumerate() {
+    for (i, which) in [NetworkBranch::Dense, NetworkBranch::Skeleton].into_iter().enumerate() {
         let alone = network().alone(which);
         assert_eq!(alone.name(), ["srrf-dense-alone", "srrf-skeleton-alone"][i]);
         let found = alone.register(&source, &target).unwrap();

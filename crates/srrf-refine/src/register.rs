@@ -1,6 +1,6 @@
 //! [`Refined`]: any method with a refinement behind it.
 
-use srrf_cloud::{Branch, Register, RegisterError, Registration, Rigid, Solid};
+use srrf_cloud::{Branch, BranchKind, Register, RegisterError, Registration, Rigid, Solid};
 
 use crate::{RefineConfig, RefineTarget};
 
@@ -38,7 +38,7 @@ impl<R: Register> Refined<R> {
         let refined = target.refine(source, &starts)?;
         let mut branches = found.branches;
         branches.push(Branch {
-            name: "unrefined",
+            kind: BranchKind::Unrefined,
             target_from_source: found.target_from_source,
             inlier_ratio: refined.starts[0].support,
         });

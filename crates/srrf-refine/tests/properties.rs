@@ -302,5 +302,8 @@ fn refined_wraps_any_method() {
     assert_eq!(method.name(), "fixed+refine");
     let found = method.register(&pair.source, &pair.target).unwrap();
     assert!(distance(&found.target_from_source, &pair.target_from_source) < 2e-3);
-    assert_eq!((found.branches[0].name, found.branches[0].target_from_source), ("unrefined", off(&pair)));
+    assert_eq!(
+        (found.branches[0].kind.name(), found.branches[0].target_from_source),
+        ("unrefined", off(&pair))
+    );
 }

@@ -92,7 +92,7 @@ impl<'a> Pair<'a> {
     pub fn registration(mut self, registration: &Registration) -> Self {
         self.poses.push(Pose::new("result", registration.target_from_source));
         self.poses.extend(registration.branches.iter().map(|branch| {
-            Pose::new(branch.name, branch.target_from_source).number(
+            Pose::new(branch.kind.name(), branch.target_from_source).number(
                 Number::new("Inlier ratio", branch.inlier_ratio)
                     .help("share of the branch's correspondences that agree with its pose"),
             )
@@ -149,7 +149,7 @@ impl<'a> Pair<'a> {
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::{Branch, Skeletons};
+    use srrf_cloud::{Branch, BranchKind, Skeletons};
 
     use super::*;
 
@@ -158,7 +158,7 @@ mod tests {
         let cloud = PointCloud::new(vec![[0.0; 3]]).unwrap();
         let mut answer = Registration::from_pose(Rigid::identity());
         answer.branches.push(Branch {
-            name: "dense",
+            kind: BranchKind::Dense,
             target_from_source: Rigid::identity(),
             inlier_ratio: 0.25,
         });

@@ -12,8 +12,8 @@ pub struct CoarsePose {
     pub target_from_source: Rigid,
     /// The poses of the branches (`dense` and `skeleton`), each with its inlier ratio gamma.
     pub branches: Vec<Branch>,
-    /// Weight of the dense branch in the fusion, `gamma_c / (gamma_c + gamma_s)`.
-    pub lambda: f64,
+    /// Weight of the dense branch in the fused pose, the number that the pose was made with.
+    pub lambda: Option<f64>,
     /// Skeletons, in input coordinates.
     pub skeletons: Option<Skeletons>,
     /// Soft matches of the dense branch, in input coordinates.
@@ -27,9 +27,6 @@ impl CoarsePose {
         for branch in &mut branches {
             branch.target_from_source = pair.frame.undo_pose(&branch.target_from_source);
         }
-        let gamma = |name: &str| branches.iter().find(|b| b.name == name).map_or(0.0, |b| b.inlier_ratio);
-        let (dense, skeleton) = (gamma("dense"), gamma("skeleton"));
-        let lambda = if dense + skeleton > 0.0 { dense / (dense + skeleton) } else { 0.5 };
         let frame = &pair.frame;
         let mut skeletons = found.skeletons.clone();
         if let Some(Skeletons { source, target }) = &mut skeletons {
@@ -42,7 +39,7 @@ impl CoarsePose {
             m.target = frame.undo_target(&m.target);
         }
         let target_from_source = pair.frame.undo_pose(&found.target_from_source);
-        Self { target_from_source, branches, lambda, skeletons, matches }
+        Self { target_from_source, branches, lambda: found.lambda, skeletons, matches }
     }
 
     pub(crate) fn to_json(&self) -> Value {
@@ -52,7 +49,7 @@ impl CoarsePose {
             .map(|b| {
                 let value =
                     json!({ "target_from_source": matrix(&b.target_from_source), "inlier_ratio": b.inlier_ratio });
-                (b.name.to_owned(), value)
+                (b.kind.to_string(), value)
             })
             .collect();
         json!({

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::{Serialize, Serializer};
+use srrf_cloud::BranchKind;
 
 use crate::options::Method;
 
@@ -12,7 +13,7 @@ pub enum Start {
     /// The fused pose of the network.
     NetworkFused,
     /// The pose of one branch of the network: `dense` or `skeleton`.
-    NetworkBranch(&'static str),
+    NetworkBranch(BranchKind),
     /// The network, with the source turned to this orientation of a cube, 1 to 23.
     Orientation(usize),
     /// FPFH with RANSAC.
@@ -70,7 +71,7 @@ mod tests {
     fn names_in_results_stay() {
         let names = [
             (Start::NetworkFused, "network fused"),
-            (Start::NetworkBranch("skeleton"), "network skeleton"),
+            (Start::NetworkBranch(BranchKind::Skeleton), "network skeleton"),
             (Start::Orientation(7), "network, orientation 7"),
             (Start::FpfhRansac { feature_voxels: 8.0 }, "fpfh-ransac"),
             (Start::Icp, "icp"),

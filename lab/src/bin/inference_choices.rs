@@ -16,7 +16,7 @@ use srrf_corrupt::crop::{crop, random_direction};
 use srrf_corrupt::{CorruptionKind, Pair};
 use srrf_eval::{MetricError, PoseError, Scores};
 use srrf_lab::{Failure, held_out_pairs, keep};
-use srrf_model::{BranchKind, SrrfConfig, SrrfRegister, device, embedded, keep_freed_memory};
+use srrf_model::{NetworkBranch, SrrfConfig, SrrfRegister, device, embedded, keep_freed_memory};
 use srrf_train::TrainConfig;
 use srrf_train::workers::Workers;
 use toml::{Table, Value};
@@ -155,7 +155,7 @@ fn main() -> Result<(), Failure> {
         let errors = match arguments.alone {
             true => {
                 let alone = |branch| errors_of(&network().alone(branch), &held_out, &workers, own);
-                [alone(BranchKind::Dense)?, alone(BranchKind::Skeleton)?].concat()
+                [alone(NetworkBranch::Dense)?, alone(NetworkBranch::Skeleton)?].concat()
             }
             false => errors_of(&network(), &held_out, &workers, of_both)?,
         };

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::defaults;
 use crate::ops::{CopyError, distance, nearest_distance, nearest_rows, rows};
 use crate::procrustes::transform;
-use crate::sem::Skeleton;
+use crate::sem::SkeletonBatch;
 
 /// Weights of the skeleton losses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -75,8 +75,8 @@ pub fn chamfer(a: Tensor<3>, b: Tensor<3>) -> Result<Tensor<1>, CopyError> {
 /// As [`chamfer`].
 pub fn skeleton_loss(
     config: &SkeletonLossConfig,
-    (source, source_skeleton): (Tensor<3>, &Skeleton),
-    (target, target_skeleton): (Tensor<3>, &Skeleton),
+    (source, source_skeleton): (Tensor<3>, &SkeletonBatch),
+    (target, target_skeleton): (Tensor<3>, &SkeletonBatch),
     rotation: Tensor<3>,
     translation: Tensor<2>,
 ) -> Result<SkeletonLoss, CopyError> {

@@ -22,7 +22,7 @@ use burn::tensor::{Device, Tensor};
 use common::Numbers;
 use reference::{Numbered, Reference, filled_as};
 use srrf_model::{
-    BranchOutput, Skeleton, SkeletonLossConfig, SoftMatching, chamfer, correspondence_loss, procrustes,
+    BranchOutput, SkeletonBatch, SkeletonLossConfig, SoftMatching, chamfer, correspondence_loss, procrustes,
     registration_loss, skeleton_loss,
 };
 
@@ -55,7 +55,7 @@ fn skeleton_losses() {
             let [source, target, skeletons] = ["source", "target", "skeletons"]
                 .map(|name| reference.tensor::<3>(&format!("losses.{name}")));
             let radii = reference.tensor::<2>("losses.radii");
-            let half = |which: usize| Skeleton {
+            let half = |which: usize| SkeletonBatch {
                 points: skeletons.clone().narrow(0, 2 * which, 2),
                 radii: radii.clone().narrow(0, 2 * which, 2),
                 // The losses look at neither of these.

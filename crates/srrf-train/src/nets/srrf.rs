@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use srrf_model::ops::{CopyError, HostClouds};
 use srrf_model::weights::WeightsError;
 use srrf_model::{
-    BranchLayout, BranchOutput, SemLayout, Skeleton, SkeletonLossConfig, Srrf, SrrfConfig, SrrfLayout,
+    BranchLayout, BranchOutput, SemLayout, SkeletonBatch, SkeletonLossConfig, Srrf, SrrfConfig, SrrfLayout,
     TrainingBatch, chamfer, correspondence_loss, defaults, embedded, matching_loss, registration_loss,
     skeleton_loss, spread, transform,
 };

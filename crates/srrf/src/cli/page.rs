@@ -95,7 +95,7 @@ pub fn of_outcome(
         };
         pair = pair.pose(Pose::new("network, fused", network.target_from_source));
         for branch in &network.branches {
-            let name = format!("network, {}", branch.name);
+            let name = format!("network, {}", branch.kind);
             pair = pair.pose(Pose::new(name, branch.target_from_source).number(inliers(branch.inlier_ratio)));
         }
         if let Some(skeletons) = &network.skeletons {

@@ -79,7 +79,7 @@ fn starts(found: &Registration) -> Vec<Proposal> {
     let branches = found
         .branches
         .iter()
-        .map(|b| Proposal { start: Start::NetworkBranch(b.name), pose: b.target_from_source });
+        .map(|b| Proposal { start: Start::NetworkBranch(b.kind), pose: b.target_from_source });
     std::iter::once(fused).chain(branches).collect()
 }
 
