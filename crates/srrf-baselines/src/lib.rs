@@ -30,4 +30,5 @@ learned_baselines! {
 }
 
 pub use learned::{LearnedConfig, LearnedRegister, Pose};
-pub use list::{BaselineEntry, BaselineVisitor, TrainedWeights, embedded};
+pub use list::{BaselineEntry, BaselineVisitor, embedded};
+pub use srrf_model::embedded::TrainedWeights;

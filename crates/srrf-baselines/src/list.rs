@@ -1,5 +1,7 @@
 //! The one list of learned baselines: what training, scoring and reports know of them.
 
+use srrf_model::embedded::TrainedWeights;
+
 use crate::{BASELINES, LearnedConfig};
 
 /// A learned baseline.
@@ -9,15 +11,6 @@ pub struct BaselineEntry {
     pub name: &'static str,
     /// Trained weights in the program, if there are some.
     pub weights: Option<TrainedWeights>,
-}
-
-/// Trained weights in the program.
-#[derive(Debug, Clone, Copy)]
-pub struct TrainedWeights {
-    /// A safetensors file, for [`srrf_model::weights::parse`].
-    pub bytes: &'static [u8],
-    /// How they were trained, in Markdown.
-    pub card: &'static str,
 }
 
 /// What somebody does with a baseline of which only the name is known: [`visit`](crate::visit) calls it with its type.

@@ -10,7 +10,7 @@ use srrf_baselines::{BASELINES, BaselineVisitor, LearnedConfig, LearnedRegister}
 use srrf_classical::{Fgr, FpfhRansac, Icp, IcpConfig, IcpPlane, IcpRobust, IcpTrimmed, Identity};
 use srrf_cloud::Register;
 use srrf_model::weights::{self, LoadedModel, WeightsError};
-use srrf_model::{NetworkBranch, DeviceError, NetworkConfig, SrrfRegister, embedded};
+use srrf_model::{DeviceError, NetworkBranch, NetworkConfig, SrrfRegister, embedded};
 use srrf_refine::{RefineConfig, Refined};
 
 use crate::rows::TableRow;

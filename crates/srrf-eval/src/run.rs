@@ -241,7 +241,9 @@ impl Run<'_> {
 
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::{Branch, BranchKind, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, Solid};
+    use srrf_cloud::{
+        Branch, BranchKind, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, Solid,
+    };
     use srrf_corrupt::{CorruptionKind, PairConfig, Severity};
 
     use super::*;
@@ -296,7 +298,7 @@ mod tests {
     }
 
     fn cached(pairs: &SynthesizedPairs, threads: usize, cache: Option<&Cache>) -> RunOutcome {
-        let moody = ReadyMethod { branches: &["left", "right"], ..ReadyMethod::new(Moody) };
+        let moody = ReadyMethod { branches: &["dense", "skeleton"], ..ReadyMethod::new(Moody) };
         let icp = ReadyMethod::new(srrf_classical::Icp::default());
         let methods = [moody, icp];
         let rows = [&[TableRow::ICP, TableRow::Oracle][..], &methods[0].rows()].concat();

@@ -6,42 +6,69 @@ use burn::tensor::Device;
 
 use crate::weights::{self, LoadedModel, WeightsError, from_safetensors};
 
-/// Names of the embedded models with their files; the model cards lie beside them in `weights/`.
-/// The first is the default.
-const EMBEDDED: &[(&str, &[u8])] = &[
-    ("srrf", include_bytes!("../weights/srrf.safetensors")),
-    ("srrf-small", include_bytes!("../weights/srrf-small.safetensors")),
-    ("srrf-shapes", include_bytes!("../weights/srrf-shapes.safetensors")),
-];
-
-/// Embedded networks that are no models to register with: two skeleton modules, trained with and without the
-/// distribution distance loss, for the comparison of the two.
-const ABLATIONS: &[(&str, &[u8])] = &[
-    ("srrf-ddl", include_bytes!("../weights/srrf-ddl.safetensors")),
-    ("srrf-no-ddl", include_bytes!("../weights/srrf-no-ddl.safetensors")),
-];
-
-/// Names of the embedded models, the default first.
-pub fn names() -> impl Iterator<Item = &'static str> {
-    EMBEDDED.iter().map(|(name, _)| *name)
+/// Trained weights in a program.
+#[derive(Debug, Clone, Copy)]
+pub struct TrainedWeights {
+    /// A safetensors file, for [`weights::parse`].
+    pub bytes: &'static [u8],
+    /// How they were trained and what they are good for, in Markdown.
+    pub card: &'static str,
 }
 
-/// The file of a network in the program.
-fn file(name: &str) -> Option<&'static [u8]> {
-    EMBEDDED.iter().chain(ABLATIONS).find(|(known, _)| *known == name).map(|(_, bytes)| *bytes)
+/// A network in the program.
+#[derive(Debug, Clone, Copy)]
+pub struct EmbeddedModel {
+    /// Its name.
+    pub name: &'static str,
+    /// Whether it registers; the others are skeleton modules to compare, whose branches are untrained.
+    pub registers: bool,
+    /// Its weights.
+    pub weights: TrainedWeights,
+}
+
+/// The entry of the network whose weights and card lie in `weights/`.
+macro_rules! model {
+    ($name:literal, card $card:literal, registers $registers:literal) => {
+        EmbeddedModel {
+            name: $name,
+            registers: $registers,
+            weights: TrainedWeights {
+                bytes: include_bytes!(concat!("../weights/", $name, ".safetensors")),
+                card: include_str!(concat!("../weights/", $card, ".md")),
+            },
+        }
+    };
+}
+
+/// The networks in the program, the default first. `weights/LINEAGE.toml` names these and what they were trained from.
+pub const MODELS: &[EmbeddedModel] = &[
+    model!("srrf", card "srrf", registers true),
+    model!("srrf-small", card "srrf-small", registers true),
+    model!("srrf-shapes", card "srrf-shapes", registers true),
+    model!("srrf-ddl", card "srrf-ddl", registers false),
+    model!("srrf-no-ddl", card "srrf-ddl", registers false),
+];
+
+/// Names of the models to register with, the default first.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    MODELS.iter().filter(|model| model.registers).map(|model| model.name)
+}
+
+/// The network of this name, if the program has it.
+pub fn model(name: &str) -> Option<&'static EmbeddedModel> {
+    MODELS.iter().find(|model| model.name == name)
 }
 
 /// Whether [`load`] knows `name`.
 pub fn contains(name: &str) -> bool {
-    file(name).is_some()
+    model(name).is_some()
 }
 
 /// An embedded model by name: `srrf` (trained on ModelNet40, the default), `srrf-small` (trained on the same shapes,
-/// seven tenths of the time) or `srrf-shapes` (trained on the built-in shapes). `None` if there is no model of that name. What
-/// they were trained from lies beside them as files, `srrf-start`, `srrf-2`, `srrf-small-start` and `srrf-small-2`. `srrf-ddl`
+/// seven tenths of the time) or `srrf-shapes` (trained on the built-in shapes). `None` if there is no model of that name. `srrf-ddl`
 /// and `srrf-no-ddl` are two skeleton modules to compare, whose branches are untrained.
 pub fn load(name: &str, device: &Device) -> Option<Result<LoadedModel, WeightsError>> {
-    Some(from_safetensors(file(name)?, &format!("embedded weights {name}"), device))
+    Some(from_safetensors(model(name)?.weights.bytes, &format!("embedded weights {name}"), device))
 }
 
 /// The weights that a user names: a model in the program, or a file.
@@ -64,8 +91,8 @@ pub fn open(name: &str, device: &Device) -> Result<LoadedModel, WeightsError> {
 /// # Errors
 /// [`WeightsError`] if the embedded bytes were damaged at build time.
 pub fn load_default(device: &Device) -> Result<LoadedModel, WeightsError> {
-    let (name, bytes) = EMBEDDED[0];
-    from_safetensors(bytes, &format!("embedded weights {name}"), device)
+    let EmbeddedModel { name, weights, .. } = MODELS[0];
+    from_safetensors(weights.bytes, &format!("embedded weights {name}"), device)
 }
 
 #[cfg(test)]
@@ -81,8 +108,9 @@ mod tests {
         }
         assert_eq!(names().count(), 3);
         assert!(contains("srrf-ddl") && contains("srrf") && !contains("srrf-large"));
-        for (name, _) in ABLATIONS {
-            assert!(load(name, &device).unwrap().is_ok(), "{name}");
+        for model in MODELS {
+            assert!(load(model.name, &device).unwrap().is_ok(), "{}", model.name);
+            assert!(model.weights.card.starts_with("# srrf"), "{}", model.name);
         }
         assert!(load("srrf-large", &device).is_none());
         assert_eq!(open("srrf-shapes", &device).unwrap().name, "srrf-shapes");

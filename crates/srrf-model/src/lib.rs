@@ -42,7 +42,7 @@ pub use device::{
     kind as device_kind,
 };
 pub use inference::{InferenceConfig, Matches};
-pub use integration::{Fusion, InlierTest, IntegrationConfig, PosedMatches};
+pub use integration::{BranchRatios, CommonRatios, Fusion, IntegrationRule, McNemar, PosedMatches};
 pub use losses::{
     SkeletonLoss, SkeletonLossConfig, chamfer, correspondence_loss, matching_loss, registration_loss,
     skeleton_loss, spread,

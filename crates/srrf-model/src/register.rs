@@ -10,7 +10,7 @@ use srrf_cloud::{
 use crate::batch::PairBatch;
 use crate::branch::BranchOutput;
 use crate::inference::InferenceConfig;
-use crate::integration::IntegrationConfig;
+use crate::integration::IntegrationRule;
 use crate::ops::{CopyError, even_subsample, to_host};
 use crate::prior::PositionPrior;
 use crate::sem::SkeletonBatch;
@@ -26,7 +26,7 @@ pub struct SrrfRegister {
     model: Srrf,
     /// The same network, as the last pass uses it.
     last: Srrf,
-    integration: IntegrationConfig,
+    integration: IntegrationRule,
     /// Standard deviation of the prior on where matches lie, in the passes after the first one.
     prior: Option<f64>,
     /// The only branch that runs; both and their integration if none.

@@ -8,7 +8,6 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::branch::BranchConfig;
-use crate::integration::InlierTest;
 use crate::sem::SemConfig;
 use crate::srrf::{Srrf, SrrfConfig};
 
@@ -71,19 +70,8 @@ impl SrrfConfig {
         if self.inference.passes == 0 {
             return wrong("inference.passes".into(), "must be 1 or more");
         }
-        let weight = self.integration.skeleton_weight;
-        if !(weight.is_finite() && weight >= 0.0) {
-            return wrong("integration.skeleton_weight".into(), "must be 0 or more; 1 is the paper");
-        }
-        let integration = &self.integration;
-        if integration
-            .standard_errors
-            .is_some_and(|z| !(z.is_finite() && z >= 0.0 && integration.test == InlierTest::Common))
-        {
-            return wrong(
-                "integration.standard_errors".into(),
-                "must be 0 or more, and needs the test `common`; leave it out to weigh the inlier ratios",
-            );
+        if let Some((key, why)) = self.integration.wrong() {
+            return wrong(format!("integration.{key}"), why);
         }
         if self.inference.prior.is_some_and(|deviation| !(deviation.is_finite() && deviation > 0.0)) {
             return wrong("inference.prior".into(), "must be a number above 0; leave it out for no prior");

@@ -8,7 +8,7 @@ use srrf_cloud::profile::stage;
 
 use crate::branch::{BranchConfig, BranchLayout, BranchOutput, RegistrationBranch};
 use crate::inference::InferenceConfig;
-use crate::integration::{Fusion, IntegrationConfig};
+use crate::integration::{Fusion, IntegrationRule};
 use crate::ops::{CopyError, HostClouds};
 use crate::prior::PositionPrior;
 use crate::sem::{Sem, SemConfig, SemLayout, SkeletonBatch};
@@ -25,7 +25,7 @@ pub struct SrrfConfig {
     /// The branch on the skeletons, superscript s.
     pub skeleton: BranchConfig,
     /// The transformation integration.
-    pub integration: IntegrationConfig,
+    pub integration: IntegrationRule,
     /// How the trained network is used; training takes no notice of it.
     #[serde(default, skip_serializing_if = "InferenceConfig::is_default")]
     pub inference: InferenceConfig,
@@ -108,7 +108,7 @@ impl Srrf {
     /// [`CopyError`] where the device does not give its numbers.
     pub fn forward(
         &self,
-        integration: &IntegrationConfig,
+        integration: &IntegrationRule,
         source: Tensor<3>,
         target: Tensor<3>,
         phase: f32,
@@ -125,7 +125,7 @@ impl Srrf {
     /// [`CopyError`] where the device does not give its numbers.
     pub fn forward_near(
         &self,
-        integration: &IntegrationConfig,
+        integration: &IntegrationRule,
         source: Tensor<3>,
         target: Tensor<3>,
         phase: f32,

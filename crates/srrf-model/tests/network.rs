@@ -3,10 +3,12 @@
 mod common;
 
 use burn::tensor::{Device, Tensor};
-use common::{Numbers, difference, row_major, tensor, tiny, values};
+use common::{Numbers, difference, ratios, row_major, tensor, tiny, values};
 use nalgebra::{Matrix3, Vector3};
 use srrf_cloud::Rigid;
-use srrf_model::{Fusion, InlierTest, IntegrationConfig, PosedMatches, SrrfOutput, init};
+use srrf_model::{
+    BranchRatios, CommonRatios, Fusion, IntegrationRule, McNemar, PosedMatches, SrrfOutput, init,
+};
 
 const BATCH: usize = 3;
 const POINTS: usize = 61;
@@ -113,13 +115,7 @@ fn claim(pose: Rigid, inliers: usize, n: usize, numbers: &mut Numbers) -> Claim 
     Claim { pose, matches: matches.collect(), points }
 }
 
-fn fuse(
-    config: &IntegrationConfig,
-    dense: &Claim,
-    skeleton: &Claim,
-    source: &[f64],
-    target: &[f64],
-) -> Fusion {
+fn fuse(config: &IntegrationRule, dense: &Claim, skeleton: &Claim, source: &[f64], target: &[f64]) -> Fusion {
     let device = Device::flex();
     let tensors = |claim: &Claim| {
         let n = claim.points.len() / 3;
@@ -161,9 +157,10 @@ fn drawn(degrees: f64, numbers: &mut Numbers) -> Rigid {
 #[test]
 fn lambda_weighs_the_inlier_ratios() {
     let mut numbers = Numbers(8);
-    let paper = IntegrationConfig { test: InlierTest::SoftMatch, ..tiny().integration };
-    let sharp = IntegrationConfig { sharpness: 2.0, ..paper.clone() };
-    let handicapped = IntegrationConfig { skeleton_weight: 0.5, ..sharp.clone() };
+    let paper = IntegrationRule::SoftMatch(ratios(0.05, 0.1));
+    let sharper = BranchRatios { sharpness: 2.0, ..ratios(0.05, 0.1) };
+    let sharp = IntegrationRule::SoftMatch(sharper.clone());
+    let handicapped = IntegrationRule::SoftMatch(BranchRatios { skeleton_weight: 0.5, ..sharper });
     let cloud = numbers.many(21);
     // Inliers of 5 dense and of 7 skeleton correspondences, and lambda at sharpness 1 and 2.
     for (dense, skeleton, lambda, lambda_sharp) in [
@@ -203,8 +200,10 @@ fn lambda_weighs_the_inlier_ratios() {
 #[test]
 fn common_correspondences_judge_both_poses() {
     let mut numbers = Numbers(11);
-    let config = IntegrationConfig { test: InlierTest::Common, ..tiny().integration };
-    let three = IntegrationConfig { standard_errors: Some(3.0), ..config.clone() };
+    let config =
+        IntegrationRule::Common(CommonRatios { threshold: 0.05, sharpness: 1.0, skeleton_weight: 1.0 });
+    let ahead = |standard_errors| IntegrationRule::McNemar(McNemar { threshold: 0.05, standard_errors });
+    let three = ahead(3.0);
     let cloud = numbers.many(21);
     let (a, b) = (drawn(45.0, &mut numbers), drawn(45.0, &mut numbers));
     // The skeleton branch's pose explains 9 or 10 of the 12 matches, the dense branch's own pose one of the others.
@@ -220,7 +219,7 @@ fn common_correspondences_judge_both_poses() {
         assert!((fusion.lambda[0] - 1.0 / (1.0 + explained as f64)).abs() < 1e-12);
         // (9 - 1) / sqrt(10) is 2.53 and (10 - 1) / sqrt(11) is 2.71: below 3, and on two sides of 2.6.
         assert_eq!(fuse(&three, &dense, &skeleton, &cloud, &cloud).lambda, [1.0]);
-        let between = IntegrationConfig { standard_errors: Some(2.6), ..config.clone() };
+        let between = ahead(2.6);
         assert_eq!(fuse(&between, &dense, &skeleton, &cloud, &cloud).lambda, [lambda]);
     }
 }
@@ -241,7 +240,7 @@ fn poses_that_agree_are_kept_and_opposite_ones_stay_rotations() {
         let half_turn = Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0));
         let opposite = Rigid { rotation: pose.rotation * half_turn, ..pose };
         let s = claim(opposite, 0, 7, &mut numbers);
-        let paper = IntegrationConfig { test: InlierTest::SoftMatch, ..config.clone() };
+        let paper = IntegrationRule::SoftMatch(ratios(0.05, 0.1));
         let fusion = fuse(&paper, &claim(pose, 0, 5, &mut numbers), &s, &cloud, &cloud);
         assert_eq!(fusion.lambda, [0.5]);
         assert_proper(&values(&fusion.rotation));
@@ -251,7 +250,7 @@ fn poses_that_agree_are_kept_and_opposite_ones_stay_rotations() {
 #[test]
 fn nearest_test_counts_points_of_the_whole_cloud() {
     let mut numbers = Numbers(10);
-    let config = IntegrationConfig { dense_threshold: 0.05, skeleton_threshold: 0.2, ..tiny().integration };
+    let config = IntegrationRule::Nearest(ratios(0.05, 0.2));
     let mut source = numbers.many(33);
     for (i, p) in source.chunks_exact_mut(3).enumerate() {
         p[0] = i as f64; // no two points closer than 1

@@ -10,7 +10,7 @@ use common::Numbers;
 use nalgebra::Vector3;
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_model::{
-    BranchConfig, BranchOutput, InferenceConfig, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig,
+    BranchConfig, BranchOutput, BranchRatios, InferenceConfig, IntegrationRule, LevelConfig, MatchingConfig,
     PairBatch, PfiConfig, SemConfig, SfeConfig, SkeletonLossConfig, Srrf, SrrfConfig, chamfer,
     correspondence_loss, init, registration_loss, skeleton_loss,
 };
@@ -44,14 +44,12 @@ fn config() -> SrrfConfig {
             sfe: sfe(6),
             pfi,
         },
-        integration: IntegrationConfig {
-            test: InlierTest::Nearest,
+        integration: IntegrationRule::Nearest(BranchRatios {
             dense_threshold: 0.05,
             skeleton_threshold: 0.05,
             sharpness: 1.0,
             skeleton_weight: 1.0,
-            standard_errors: None,
-        },
+        }),
         inference: InferenceConfig::default(),
     }
 }
@@ -150,7 +148,7 @@ impl Lesson {
 
     /// Both branches, on skeletons that stay. The correspondences show the way; the second half is
     /// left to the paper's loss alone.
-    fn with_branches(&self, mut model: Srrf, integration: &IntegrationConfig, steps: usize) -> Srrf {
+    fn with_branches(&self, mut model: Srrf, integration: &IntegrationRule, steps: usize) -> Srrf {
         let mut adam = AdamConfig::new().init();
         for step in 0..steps {
             let (dense, skeleton) = (model.dense.train(), model.skeleton.train());
@@ -176,7 +174,7 @@ impl Lesson {
     }
 
     /// The largest rotation error of the eight pairs in degrees: dense, skeleton, fused.
-    fn worst_deg(&self, model: &Srrf, integration: &IntegrationConfig) -> [f64; 3] {
+    fn worst_deg(&self, model: &Srrf, integration: &IntegrationRule) -> [f64; 3] {
         let (source, target) = self.clouds();
         let output = model.forward(integration, source, target, 0.5).unwrap();
         let worst = |rotation: &Tensor<3>, translation: &Tensor<2>| {

@@ -7,12 +7,12 @@ mod common;
 use std::collections::BTreeMap;
 
 use burn::tensor::Device;
-use common::{Numbers, difference, tiny, values};
+use common::{Numbers, difference, ratios, tiny, values};
 use nalgebra::Vector3;
 use srrf_cloud::{CloudError, PointCloud, Register, RegisterError, Registration, Rigid, SoftMatch};
 use srrf_model::{
-    InferenceConfig, InlierTest, Matches, NetworkBranch, PairBatch, SrrfConfig, SrrfRegister, embedded, init,
-    network_frame, weights,
+    BranchRatios, CommonRatios, InferenceConfig, IntegrationRule, Matches, McNemar, NetworkBranch, PairBatch,
+    SrrfConfig, SrrfRegister, embedded, init, network_frame, weights,
 };
 
 /// Far from the origin, as map coordinates in metres are.
@@ -171,18 +171,15 @@ fn lambda_is_the_number_that_the_pose_was_made_with() {
     let (source, target) = (cloud(13, 61), cloud(14, 61));
     let mut lambdas = Vec::new();
     for passes in [1, 2, 3] {
-        for (test, standard_errors, sharpness) in [
-            (InlierTest::SoftMatch, None, 1.0),
-            (InlierTest::Nearest, None, 2.0),
-            (InlierTest::BothWays, None, 1.0),
-            (InlierTest::Common, None, 1.0),
-            (InlierTest::Common, Some(1.0), 1.0),
+        for integration in [
+            IntegrationRule::SoftMatch(ratios(0.4, 0.3)),
+            IntegrationRule::Nearest(BranchRatios { sharpness: 2.0, ..ratios(0.4, 0.3) }),
+            IntegrationRule::BothWays(ratios(0.4, 0.3)),
+            IntegrationRule::Common(CommonRatios { threshold: 0.4, sharpness: 1.0, skeleton_weight: 0.5 }),
+            IntegrationRule::McNemar(McNemar { threshold: 0.4, standard_errors: 1.0 }),
         ] {
-            let mut config = tiny();
-            config.inference.passes = passes;
-            let fusion = &mut config.integration;
-            (fusion.test, fusion.standard_errors, fusion.sharpness) = (test, standard_errors, sharpness);
-            (fusion.dense_threshold, fusion.skeleton_threshold) = (0.4, 0.3);
+            let inference = InferenceConfig { passes, ..InferenceConfig::default() };
+            let config = SrrfConfig { integration, inference, ..tiny() };
             let answer = with_config(config).register(&source, &target).unwrap();
             is_the_blend(&answer, &source);
             lambdas.push(answer.lambda.unwrap());

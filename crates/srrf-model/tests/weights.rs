@@ -8,13 +8,13 @@ use std::error::Error;
 use std::path::Path;
 
 use burn::tensor::Device;
-use common::tiny;
+use common::{ratios, tiny};
 use half::f16;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use srrf_model::weights::{
     WeightsError, from_safetensors, load, parameters, to_safetensors, with_parameters, write_atomically,
 };
-use srrf_model::{Srrf, SrrfConfig, init};
+use srrf_model::{BranchRatios, IntegrationRule, McNemar, Srrf, SrrfConfig, init};
 
 fn model() -> Srrf {
     init::seeded(tiny().init(&Device::flex()), 9)
@@ -160,8 +160,13 @@ fn files_of_other_programs_are_named() {
         ("sem.skeleton_points", |c| c.sem.skeleton_points = 2),
         ("inference.passes", |c| c.inference.passes = 0),
         ("inference.prior", |c| c.inference.prior = Some(0.0)),
-        ("integration.skeleton_weight", |c| c.integration.skeleton_weight = -1.0),
-        ("integration.standard_errors", |c| c.integration.standard_errors = Some(3.0)),
+        ("integration.skeleton_weight", |c| {
+            c.integration =
+                IntegrationRule::Nearest(BranchRatios { skeleton_weight: -1.0, ..ratios(0.1, 0.2) });
+        }),
+        ("integration.standard_errors", |c| {
+            c.integration = IntegrationRule::McNemar(McNemar { threshold: 0.1, standard_errors: -3.0 });
+        }),
     ];
     for (key, change) in changes {
         let impossible = rewritten(|_, header| {

@@ -2,7 +2,7 @@
 
 use srrf_cloud::{Register, RegisterError, Registration, Solid};
 use srrf_corrupt::CorruptionKind;
-use srrf_model::{InlierTest, IntegrationConfig, SrrfRegister};
+use srrf_model::{BranchRatios, IntegrationRule, SrrfRegister};
 
 use crate::EvalError;
 use crate::methods::{MethodContext, ReadyMethod, SetupError, network};
@@ -16,16 +16,16 @@ pub(crate) const CORRUPTIONS: [CorruptionKind; 5] = [
     CorruptionKind::DistortionRbf,
 ];
 
-/// A variant: its row, the test, the two thresholds (dense, skeleton), the sharpness.
-type Variant = (&'static str, InlierTest, [f64; 2], f64);
+/// A variant: its row, the rule, its two thresholds (dense, skeleton), the sharpness.
+type Variant = (&'static str, fn(BranchRatios) -> IntegrationRule, [f64; 2], f64);
 
 const VARIANTS: [Variant; 6] = [
-    ("nearest 0.03", InlierTest::Nearest, [0.03; 2], 1.0),
-    ("nearest 0.05", InlierTest::Nearest, [0.05; 2], 1.0),
-    ("nearest 0.1", InlierTest::Nearest, [0.1; 2], 1.0),
-    ("nearest 0.2", InlierTest::Nearest, [0.2; 2], 1.0),
-    ("soft match 0.05, 0.1", InlierTest::SoftMatch, [0.05, 0.1], 1.0),
-    ("lambda 0.5", InlierTest::Nearest, [0.05; 2], 0.0),
+    ("nearest 0.03", IntegrationRule::Nearest, [0.03; 2], 1.0),
+    ("nearest 0.05", IntegrationRule::Nearest, [0.05; 2], 1.0),
+    ("nearest 0.1", IntegrationRule::Nearest, [0.1; 2], 1.0),
+    ("nearest 0.2", IntegrationRule::Nearest, [0.2; 2], 1.0),
+    ("soft match 0.05, 0.1", IntegrationRule::SoftMatch, [0.05, 0.1], 1.0),
+    ("lambda 0.5", IntegrationRule::Nearest, [0.05; 2], 0.0),
 ];
 
 /// What the names of the variants say, for the note of the table.
@@ -56,22 +56,18 @@ impl Register for Named {
 /// # Errors
 /// [`EvalError::Setup`] where the weights cannot be had.
 pub(crate) fn methods(context: &MethodContext) -> Result<Vec<ReadyMethod>, EvalError> {
-    let set_up = |&(name, test, [dense, skeleton], sharpness): &Variant| {
+    let set_up = |&(name, rule, [dense, skeleton], sharpness): &Variant| {
         let (mut loaded, weights) = network(context)?;
-        loaded.config.integration = IntegrationConfig {
-            test,
+        let rule = rule(BranchRatios {
             dense_threshold: dense,
             skeleton_threshold: skeleton,
             sharpness,
             skeleton_weight: 1.0,
-            standard_errors: None,
-        };
+        });
+        let settings = rule.to_string();
+        loaded.config.integration = rule;
         let inner = SrrfRegister::new(loaded, srrf_model::device(&context.device)?);
-        Ok(ReadyMethod {
-            weights: Some(weights),
-            settings: format!("{test:?}, thresholds {dense} and {skeleton}, sharpness {sharpness}"),
-            ..ReadyMethod::new(Named { inner, name })
-        })
+        Ok(ReadyMethod { weights: Some(weights), settings, ..ReadyMethod::new(Named { inner, name }) })
     };
     let named = |source: SetupError| EvalError::Setup { name: "srrf", source };
     VARIANTS.iter().map(|variant| set_up(variant).map_err(named)).collect()

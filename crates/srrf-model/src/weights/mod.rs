@@ -71,11 +71,7 @@ pub fn to_safetensors<C: NetworkConfig>(
         .map(|(path, shape, bytes)| Ok((path.as_str(), TensorView::new(Dtype::F16, shape.clone(), bytes)?)))
         .collect::<Result<Vec<_>, _>>()
         .map_err(|source| WeightsError::Format { origin: origin(), source })?;
-    let config = serde_json::to_string(config).map_err(|why| WeightsError::Header {
-        origin: origin(),
-        key: C::KEY,
-        why: why.to_string(),
-    })?;
+    let config = header_json(config, &origin())?;
     let mut header: HashMap<String, String> = notes.iter().map(|(k, v)| (k.clone(), v.clone())).collect();
     header.insert(C::KEY.into(), config);
     header.insert(NAME_KEY.into(), name.into());
@@ -95,6 +91,35 @@ pub fn save<C: NetworkConfig>(
     notes: &BTreeMap<String, String>,
 ) -> Result<(), WeightsError> {
     write_atomically(path, &to_safetensors(model, config, name, notes)?)
+}
+
+/// The same weights with another configuration in the header, of the same sizes: how the network is used. Tensors and all
+/// other entries stay as they are; `origin` names the bytes in errors.
+///
+/// # Errors
+/// As [`parse`], also for a configuration whose sizes are not those of the weights.
+pub fn with_config<C: NetworkConfig>(
+    bytes: &[u8],
+    origin: &str,
+    config: &C,
+) -> Result<Vec<u8>, WeightsError> {
+    let format = |source| WeightsError::Format { origin: origin.to_owned(), source };
+    let (_, header) = SafeTensors::read_metadata(bytes).map_err(format)?;
+    let mut metadata = header.metadata().clone().unwrap_or_default();
+    metadata.insert(C::KEY.into(), header_json(config, origin)?);
+    let tensors = SafeTensors::deserialize(bytes).map_err(format)?;
+    let written = safetensors::serialize(tensors.tensors(), Some(metadata)).map_err(format)?;
+    parse::<C>(&written, origin, &Device::flex())?;
+    Ok(written)
+}
+
+/// The configuration as the header has it.
+fn header_json<C: NetworkConfig>(config: &C, origin: &str) -> Result<String, WeightsError> {
+    serde_json::to_string(config).map_err(|why| WeightsError::Header {
+        origin: origin.to_owned(),
+        key: C::KEY,
+        why: why.to_string(),
+    })
 }
 
 /// Reads an SRRF network from the bytes of a safetensors file; `origin` names them in errors.

@@ -4,7 +4,7 @@
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use srrf_model::{
-    BranchConfig, InferenceConfig, InlierTest, IntegrationConfig, LevelConfig, MatchingConfig, PfiConfig,
+    BranchConfig, BranchRatios, InferenceConfig, IntegrationRule, LevelConfig, MatchingConfig, PfiConfig,
     SemConfig, SfeConfig, SrrfConfig,
 };
 
@@ -75,6 +75,11 @@ pub fn difference(a: &[f64], b: &[f64]) -> f64 {
         .fold(0.0, |most, d| if d > most || d.is_nan() { d } else { most })
 }
 
+/// The paper's weighing by two thresholds.
+pub fn ratios(dense_threshold: f64, skeleton_threshold: f64) -> BranchRatios {
+    BranchRatios { dense_threshold, skeleton_threshold, sharpness: 1.0, skeleton_weight: 1.0 }
+}
+
 /// A network with small sizes, odd where they may be.
 pub fn tiny() -> SrrfConfig {
     let level =
@@ -102,14 +107,7 @@ pub fn tiny() -> SrrfConfig {
             sfe: SfeConfig { layers: 3, neighbours: 5, width: 15, heads: 5, mlp: 7 },
             pfi: pfi(2),
         },
-        integration: IntegrationConfig {
-            test: InlierTest::Nearest,
-            dense_threshold: 0.05,
-            skeleton_threshold: 0.1,
-            sharpness: 1.0,
-            skeleton_weight: 1.0,
-            standard_errors: None,
-        },
+        integration: IntegrationRule::Nearest(ratios(0.05, 0.1)),
         inference: InferenceConfig::default(),
     }
 }

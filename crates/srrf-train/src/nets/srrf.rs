@@ -241,8 +241,8 @@ fn skeleton_terms(
     terms: &mut LossTerms,
     training: SemTraining,
     losses: &SrrfLossConfig,
-    (source, source_skeleton): (Tensor<3>, &Skeleton),
-    (target, target_skeleton): (Tensor<3>, &Skeleton),
+    (source, source_skeleton): (Tensor<3>, &SkeletonBatch),
+    (target, target_skeleton): (Tensor<3>, &SkeletonBatch),
     rotation: Tensor<3>,
     translation: Tensor<2>,
 ) -> Result<(), CopyError> {

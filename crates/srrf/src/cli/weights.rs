@@ -1,22 +1,15 @@
-//! `srrf weights`: what models there are, their cards, and whether a file is whole.
+//! `srrf weights`: what models there are, their cards and configurations, and whether a file is whole.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
-use srrf_model::weights::LoadedModel;
-use srrf_model::{device, embedded};
+use srrf_model::weights::{LoadedModel, with_config};
+use srrf_model::{SrrfConfig, device, embedded};
 
 use srrf_args::Failure;
 use srrf_args::files;
 use srrf_args::words::count;
-
-/// Model cards, by the name of the model.
-const CARDS: &[(&str, &str)] = &[
-    ("srrf", include_str!("../../../srrf-model/weights/srrf.md")),
-    ("srrf-small", include_str!("../../../srrf-model/weights/srrf-small.md")),
-    ("srrf-shapes", include_str!("../../../srrf-model/weights/srrf-shapes.md")),
-];
 
 /// List the models in the program, show their cards, check files of weights.
 #[derive(Debug, Args)]
@@ -31,8 +24,22 @@ enum WeightsCommand {
     List,
     /// Show the card of a model: what it was trained on, how well it does, where it fails
     Show {
-        /// Its name
+        /// Its name; with --config also a file
         name: String,
+        /// Print the configuration in the header instead: the sizes of the network, and how it is used
+        #[arg(long)]
+        config: bool,
+    },
+    /// Write weights with another configuration in the header: how the network is used; its sizes stay
+    Write {
+        /// A file, or the name of a model in the program
+        name: String,
+        /// The configuration, as `srrf weights show NAME --config` prints it
+        #[arg(long, value_name = "FILE")]
+        config: PathBuf,
+        /// The file to write
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
     },
     /// Load weights, check that all numbers are finite, and print their SHA-256
     Verify {
@@ -51,7 +58,9 @@ enum WeightsCommand {
 pub fn run(args: &WeightsArgs) -> Result<ExitCode, Failure> {
     let text = match &args.command {
         None | Some(WeightsCommand::List) => list()?,
-        Some(WeightsCommand::Show { name }) => show(name)?.to_owned(),
+        Some(WeightsCommand::Show { name, config: false }) => show(name)?.to_owned(),
+        Some(WeightsCommand::Show { name, config: true }) => show_config(name)?,
+        Some(WeightsCommand::Write { name, config, output }) => write(name, config, output)?,
         Some(WeightsCommand::Verify { weights, sha256 }) => verify(weights, sha256.as_deref())?,
     };
     files::write(Path::new("-"), format!("{}\n", text.trim_end()).as_bytes())?;
@@ -74,7 +83,31 @@ fn list() -> Result<String, Failure> {
 }
 
 fn show(name: &str) -> Result<&'static str, Failure> {
-    CARDS.iter().find(|(known, _)| *known == name).map(|(_, card)| *card).ok_or_else(|| unknown(name))
+    let model = embedded::model(name).filter(|model| model.registers);
+    model.map(|model| model.weights.card).ok_or_else(|| unknown(name))
+}
+
+fn show_config(name: &str) -> Result<String, Failure> {
+    toml::to_string(&open(name)?.config).map_err(Failure::other)
+}
+
+/// Writes the weights `name` with the configuration of a file.
+fn write(name: &str, config: &Path, output: &Path) -> Result<String, Failure> {
+    files::check_output(output)?;
+    let input = |source: std::io::Error, path: &Path| {
+        Failure::usage(format!("{}: {source}", path.display())).because(source)
+    };
+    let text = std::fs::read_to_string(config).map_err(|e| input(e, config))?;
+    let changed: SrrfConfig = toml::from_str(&text).map_err(|e| {
+        Failure::usage(format!("{}: {}", config.display(), e.to_string().trim_end())).because(e)
+    })?;
+    let bytes = match embedded::model(name) {
+        Some(model) => model.weights.bytes.to_vec(),
+        None => std::fs::read(name).map_err(|e| input(e, Path::new(name)))?,
+    };
+    let written = with_config(&bytes, name, &changed).map_err(Failure::input)?;
+    files::write(output, &written)?;
+    Ok(format!("wrote {}: {name} with the configuration of {}", output.display(), config.display()))
 }
 
 fn verify(weights: &str, sha256: Option<&str>) -> Result<String, Failure> {
@@ -127,7 +160,7 @@ mod tests {
     fn every_model_has_its_card() {
         assert_eq!(
             embedded::names().collect::<Vec<_>>(),
-            CARDS.iter().map(|(name, _)| *name).collect::<Vec<_>>()
+            embedded::MODELS.iter().filter(|m| m.registers).map(|m| m.name).collect::<Vec<_>>()
         );
         for name in embedded::names() {
             assert!(show(name).unwrap().starts_with(&format!("# {name}")));
