@@ -2,7 +2,6 @@
 
 use std::io::{self, Write};
 
-use super::DOUBLE;
 use super::header::{Descr, NpyHeader};
 use crate::io::FormatError;
 
@@ -54,8 +53,10 @@ impl Array {
     /// # Errors
     /// Those of `out`.
     pub fn write(shape: &[usize], values: &[f64], out: &mut dyn Write) -> io::Result<()> {
-        let shape: Vec<u64> = shape.iter().map(|&axis| axis as u64).collect();
-        out.write_all(&NpyHeader::bytes(&Descr::Plain(DOUBLE), false, &shape))?;
+        // A blank after the last comma, as the files of earlier versions have it, so that exported pairs keep their bytes.
+        let axes: String = shape.iter().map(|axis| format!("{axis}, ")).collect();
+        let text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({axes}), }}");
+        out.write_all(&NpyHeader::framed(text))?;
         values.iter().try_for_each(|value| out.write_all(&value.to_le_bytes()))
     }
 }

@@ -113,7 +113,11 @@ impl NpyHeader {
             _ => format!("({})", shape.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")),
         };
         let fortran = if fortran { "True" } else { "False" };
-        let mut text = format!("{{'descr': {descr}, 'fortran_order': {fortran}, 'shape': {shape}, }}");
+        Self::framed(format!("{{'descr': {descr}, 'fortran_order': {fortran}, 'shape': {shape}, }}"))
+    }
+
+    /// The bytes of a header with this dictionary: the magic number, the length, blanks up to a multiple of 64.
+    pub fn framed(mut text: String) -> Vec<u8> {
         let short = text.len() + 64 < usize::from(u16::MAX);
         let before = if short { 10 } else { 12 };
         while !(before + text.len() + 1).is_multiple_of(64) {
