@@ -100,7 +100,7 @@ mod tests {
         assert_eq!(Array::parse(&bytes(&[0, 3], &[])).unwrap().shape, [0, 3]);
     }
 
-    /// The bytes that another library writes, but for its shape `(2, 3, )`, which is `(2, 3)` here as in NumPy's own.
+    /// The bytes that another library writes, so that files stay as they were.
     #[test]
     fn the_bytes_are_those_of_npyz() {
         let mut theirs = Vec::new();
@@ -109,9 +109,6 @@ mod tests {
         let values = [1.0, -2.5, 1e300, 4.0, 5.0, 6.0];
         writer.extend(values).unwrap();
         writer.finish().unwrap();
-        let (shape, numpy) = (b"(2, 3, ), }", b"(2, 3), }  ");
-        let at = theirs.windows(shape.len()).position(|bytes| bytes == shape).unwrap();
-        theirs[at..at + shape.len()].copy_from_slice(numpy);
         assert_eq!(bytes(&[2, 3], &values), theirs);
     }
 
