@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct InferenceConfig {
     /// How often the network is applied, each time to the source as the last pose left it. Default: 2, which
-    /// on the validation part takes a tenth off RMSE(R) and a quarter off MAE(R) (`docs/experiments.md`).
+    /// on the validation part takes a tenth off RMSE(R) and a quarter off MAE(R) (`book/src/experiments`).
     #[schemars(range(min = 1, max = 100))]
     pub passes: usize,
     /// Tokens of the dense branch in the last pass, 0 for all points; those of the branch if not given.

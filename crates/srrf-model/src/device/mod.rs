@@ -18,7 +18,7 @@ pub enum DeviceError {
     List(String),
     /// This program was built without the device.
     #[error(
-        "device `{0}` is not built in; build with `--features {0}` (docs/backends.md). This program has: {built_in}",
+        "device `{0}` is not built in; build with `--features {0}` (book/src/train/devices.md). This program has: {built_in}",
         built_in = built_in().join(", ")
     )]
     NotBuiltIn(&'static str),
