@@ -377,12 +377,9 @@ fn the_header_says_how_the_network_is_used() {
 #[test]
 fn a_narrow_prior_matches_each_point_with_the_nearest_one() {
     let (source, target) = (cloud(25, 61), cloud(26, 61));
-    let prior = |passes| InferenceConfig {
-        passes,
-        last_tokens: Some(0),
-        last_matches: Matches::Best,
-        prior: Some(1e-3),
-    };
+    let best =
+        InferenceConfig { last_tokens: Some(0), last_matches: Matches::Best, ..InferenceConfig::default() };
+    let prior = |passes| InferenceConfig { passes, prior: Some(1e-3), ..best.clone() };
     // The first pass knows of no pose, and takes no notice.
     let without = InferenceConfig { prior: None, ..prior(1) };
     let first = network_with(without).register(&source, &target).unwrap().target_from_source;
