@@ -145,7 +145,7 @@ fn what_cannot_be_used_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let message = |arguments: &[&str]| refusal(folder.path(), &[&["tables"], arguments].concat());
     assert!(message(&["--methods", "magic"]).contains("`magic`"));
-    assert!(message(&["--shapes", "0"]).contains("--shapes 0"));
+    assert!(message(&["--shapes", "0"]).contains("--shapes"));
     assert!(message(&["--parts", "everything"]).contains("everything"));
     assert!(message(&["--variant", "file"]).contains("--variant"));
     assert!(message(&["--data", "nowhere"]).contains("nowhere"));

@@ -38,7 +38,7 @@ impl Meta {
             head += &format!("- Weights of {method}: {weights}\n");
         }
         head + &format!(
-            "- Run: version {}, {:.0} s on {} threads of {}, device {}\n- EvalCommand: `{}`\n",
+            "- Run: version {}, {:.0} s on {} threads of {}, device {}\n- Command: `{}`\n",
             self.version, self.seconds, self.threads, self.machine, self.device, self.command
         )
     }

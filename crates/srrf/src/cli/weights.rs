@@ -24,19 +24,19 @@ enum WeightsCommand {
     List,
     /// Show the card of a model: what it was trained on, how well it does, where it fails
     Show {
-        /// Its name; with --config also a file
+        /// Its name; with --header also a file
         name: String,
         /// Print the configuration in the header instead: the sizes of the network, and how it is used
         #[arg(long)]
-        config: bool,
+        header: bool,
     },
     /// Write weights with another configuration in the header: how the network is used; its sizes stay
     Write {
         /// A file, or the name of a model in the program
         name: String,
-        /// The configuration, as `srrf weights show NAME --config` prints it
+        /// The configuration, as `srrf weights show NAME --header` prints it
         #[arg(long, value_name = "FILE")]
-        config: PathBuf,
+        used_as: PathBuf,
         /// The file to write
         #[arg(short, long, value_name = "FILE")]
         output: PathBuf,
@@ -58,9 +58,9 @@ enum WeightsCommand {
 pub fn run(args: &WeightsArgs) -> Result<ExitCode, Failure> {
     let text = match &args.command {
         None | Some(WeightsCommand::List) => list()?,
-        Some(WeightsCommand::Show { name, config: false }) => show(name)?.to_owned(),
-        Some(WeightsCommand::Show { name, config: true }) => show_config(name)?,
-        Some(WeightsCommand::Write { name, config, output }) => write(name, config, output)?,
+        Some(WeightsCommand::Show { name, header: false }) => show(name)?.to_owned(),
+        Some(WeightsCommand::Show { name, header: true }) => show_config(name)?,
+        Some(WeightsCommand::Write { name, used_as, output }) => write(name, used_as, output)?,
         Some(WeightsCommand::Verify { weights, sha256 }) => verify(weights, sha256.as_deref())?,
     };
     files::write(Path::new("-"), format!("{}\n", text.trim_end()).as_bytes())?;
