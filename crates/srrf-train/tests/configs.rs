@@ -137,6 +137,12 @@ const REST_OF_SRRF: &str = "network.dense.matching = { normalise = true, sinkhor
      network.inference = { passes = 3, last_tokens = 9, last_matches = \"best\", prior = 0.1 }\n\
      losses = { registration = 0.5, matching = 0.5, fused = 0.5, skeleton.distribution_over_spread = 1.0 }\n";
 
+/// A rule has keys of its own, so that it stands in the place of the one that a file has.
+const RULES_OF_SRRF: [&str; 2] = [
+    "test = \"mcnemar\"\nthreshold = 0.02\nstandard_errors = 4.0\n",
+    "test = \"both_ways\"\ndense_threshold = 0.03\nskeleton_threshold = 0.03\nsharpness = 1.0\nskeleton_weight = 0.8\n",
+];
+
 struct IsComplete(&'static str);
 
 impl WithMethod for IsComplete {
@@ -155,9 +161,12 @@ impl WithMethod for IsComplete {
             if method == SrrfConfig::METHOD {
                 rest[0].push_str(REST_OF_SRRF);
             }
-            for rest in rest {
+            for (rest, rule) in rest.iter().zip(RULES_OF_SRRF) {
                 let mut value = toml::Value::try_from(&before.config).unwrap();
-                merge(&mut value, &toml::from_str(&rest).unwrap());
+                merge(&mut value, &toml::from_str(rest).unwrap());
+                if method == SrrfConfig::METHOD {
+                    value["network"]["integration"] = toml::from_str(rule).unwrap();
+                }
                 let config: TrainConfig<C> = value.try_into().unwrap();
                 keys_of(&toml::Value::try_from(&config).unwrap(), "", &mut used);
             }
