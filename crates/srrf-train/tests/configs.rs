@@ -143,6 +143,12 @@ const RULES_OF_SRRF: [&str; 2] = [
     "test = \"both_ways\"\ndense_threshold = 0.03\nskeleton_threshold = 0.03\nsharpness = 1.0\nskeleton_weight = 0.8\n",
 ];
 
+/// So has a schedule.
+const SCHEDULES: [&str; 2] = [
+    "milestones = { at = [75.0, 150.0], of_epochs = 250.0, factor = 0.1 }\n",
+    "cosine = { warmup = 0.03 }\n",
+];
+
 struct IsComplete(&'static str);
 
 impl WithMethod for IsComplete {
@@ -161,9 +167,10 @@ impl WithMethod for IsComplete {
             if method == SrrfConfig::METHOD {
                 rest[0].push_str(REST_OF_SRRF);
             }
-            for (rest, rule) in rest.iter().zip(RULES_OF_SRRF) {
+            for ((rest, rule), schedule) in rest.iter().zip(RULES_OF_SRRF).zip(SCHEDULES) {
                 let mut value = toml::Value::try_from(&before.config).unwrap();
                 merge(&mut value, &toml::from_str(rest).unwrap());
+                value["stages"][0]["schedule"] = toml::from_str(schedule).unwrap();
                 if method == SrrfConfig::METHOD {
                     value["network"]["integration"] = toml::from_str(rule).unwrap();
                 }
