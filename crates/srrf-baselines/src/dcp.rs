@@ -9,7 +9,9 @@ use burn::tensor::{Device, Tensor};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::ops::even_tokens;
-use srrf_model::{CopyError, NetworkConfig, WrongSize, procrustes, registration_loss, soft_matches, TrainingBatch};
+use srrf_model::{
+    CopyError, NetworkConfig, TrainingBatch, WrongSize, procrustes, registration_loss, soft_matches,
+};
 
 use crate::dgcnn::{Dgcnn, halves};
 use crate::learned::{LearnedConfig, Pose};

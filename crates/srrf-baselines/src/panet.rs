@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
 use srrf_model::ops::{HostClouds, even_tokens, flat_indices, k_nearest, rows};
-use srrf_model::{CopyError, NetworkConfig, WrongSize, transform, TrainingBatch};
+use srrf_model::{CopyError, NetworkConfig, TrainingBatch, WrongSize, transform};
 
 use crate::dgcnn::{Block, max_over};
 use crate::learned::{LearnedConfig, Pose};

@@ -26,7 +26,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
 use srrf_model::ops::{even_tokens, rows, to_host};
-use srrf_model::{CopyError, NetworkConfig, WrongSize, transform, weighted_procrustes, TrainingBatch};
+use srrf_model::{CopyError, NetworkConfig, TrainingBatch, WrongSize, transform, weighted_procrustes};
 
 use crate::learned::{LearnedConfig, Pose};
 use crate::se3::constant;

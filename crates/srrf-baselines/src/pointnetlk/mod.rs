@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::fast::{Activation, linear};
 use srrf_model::ops::even_tokens;
-use srrf_model::{CopyError, NetworkConfig, WrongSize, transform, TrainingBatch};
+use srrf_model::{CopyError, NetworkConfig, TrainingBatch, WrongSize, transform};
 
 use crate::dgcnn::max_over;
 use crate::learned::{LearnedConfig, Pose};

@@ -16,7 +16,9 @@ use burn::tensor::{Device, Tensor};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_model::ops::even_tokens;
-use srrf_model::{CopyError, NetworkConfig, WrongSize, sinkhorn, transform, weighted_procrustes, TrainingBatch};
+use srrf_model::{
+    CopyError, NetworkConfig, TrainingBatch, WrongSize, sinkhorn, transform, weighted_procrustes,
+};
 
 use crate::dgcnn::{Dgcnn, halves};
 use crate::learned::{LearnedConfig, Pose};
