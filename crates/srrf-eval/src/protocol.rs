@@ -46,14 +46,14 @@ pub struct Protocol {
 }
 
 impl Default for Protocol {
-    /// What the program scores without options: 20 shapes, clean and with every corruption at every severity.
+    /// What the program scores without options: 4 shapes, clean and with every corruption at every severity.
     fn default() -> Self {
         Self {
             clean: true,
             corruptions: CorruptionKind::ALL.to_vec(),
             mixtures: Vec::new(),
             severities: Severity::ALL.to_vec(),
-            shapes: 20,
+            shapes: 4,
             seed: 1,
             pair: PairConfig::default(),
             crop: None,
