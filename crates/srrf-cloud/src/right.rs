@@ -64,7 +64,7 @@ mod tests {
         for (shift, right) in [(0.19, true), (0.21, false)] {
             let moved = Rigid { translation: Vector3::new(0.0, shift, 0.0), ..truth };
             assert_eq!(is_right(&moved, &truth, &source, &target), right, "{shift}");
-            assert_eq!(is_right(&moved, &truth, &target, &source), false, "{shift}");
+            assert!(!is_right(&moved, &truth, &target, &source), "{shift}");
         }
     }
 

@@ -39,7 +39,7 @@ pub enum EvalError {
         /// Number of the pair in it.
         item: usize,
         /// What went wrong.
-        source: PairFault,
+        source: Box<PairFault>,
     },
     /// A name that is no corruption.
     #[error("{0}; or `clean`")]
@@ -61,7 +61,7 @@ pub enum EvalError {
         /// Its name.
         name: &'static str,
         /// What is wrong, and the way out.
-        source: SetupError,
+        source: Box<SetupError>,
     },
     /// Options that cannot be used, or not together.
     #[error("{0}")]

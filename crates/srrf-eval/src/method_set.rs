@@ -74,7 +74,7 @@ impl MethodSet {
                 Err(problem @ SetupError::Untrained { .. }) if may_leave_out => {
                     set.left_out.push((entry.name.to_owned(), problem.to_string()));
                 }
-                Err(source) => return Err(EvalError::Setup { name: entry.name, source }),
+                Err(source) => return Err(EvalError::Setup { name: entry.name, source: Box::new(source) }),
             }
         }
         let filled = |row: &TableRow| *row == TableRow::Oracle || set.method(row).is_some();

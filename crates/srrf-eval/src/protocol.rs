@@ -232,7 +232,7 @@ impl PairSource for SynthesizedPairs {
         let named = |e: srrf_corrupt::PairError| EvalError::Pair {
             group: self.groups[group].name(),
             item,
-            source: e.into(),
+            source: Box::new(e.into()),
         };
         let mut pair = pair.map_err(named)?;
         if let Some(keep) = self.protocol.crop {

@@ -1,4 +1,5 @@
 //! The gradient stop between SEM and registration: neither loss moves the other's parameters.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod common;
 

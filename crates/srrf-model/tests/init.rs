@@ -1,4 +1,5 @@
 //! Initial weights: the same bytes for the same seed, and what the distribution promises.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod common;
 

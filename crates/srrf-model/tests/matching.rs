@@ -1,4 +1,5 @@
 //! Soft matching beyond the paper: normalised scores, and slack by Sinkhorn.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! The whole network and the integration of its two poses.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod common;
 

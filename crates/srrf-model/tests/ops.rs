@@ -1,4 +1,5 @@
 //! Neighbours and samples at the edges: too many asked for, points that coincide, ties.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod common;
 

@@ -1,5 +1,6 @@
 //! Shapes and properties of the network's parts, at sizes that are pairwise distinct and odd, so
 //! that a swapped axis cannot pass.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod common;
 

@@ -1,5 +1,6 @@
 //! The SVD head: rotations at every kind of input, and gradients against central differences in
 //! `f64`.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 #![allow(clippy::expect_used, reason = "helpers of tests")]
 
 mod common;

@@ -59,7 +59,7 @@ pub enum OptionsError {
     #[error("no method `{0}`; there are auto, srrf, fpfh-ransac, icp and given")]
     Method(String),
     /// No rotation range of that name.
-    #[error("rotation `{0}`: use 45 (the clouds are turned by less than that) or 180 (by anything)")]
+    #[error("rotation `{0}`: use 45 (turned by less than that about each axis) or so3 (any rotation)")]
     Rotation(String),
 }
 

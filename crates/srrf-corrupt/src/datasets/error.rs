@@ -10,7 +10,7 @@ pub const ACCEPTED_LAYOUTS: &str = "accepted layouts: \
      ModelNet40 as HDF5 (ply_data_train0.h5, ... and shape_names.txt; 1,024 or 2,048 points) or one such .h5 file, \
      as OFF meshes (class/train/*.off, class/test/*.off), \
      as resampled text (modelnet40_train.txt, modelnet40_test.txt, class/name.txt), \
-     or a folder of .ply, .off, .xyz, .txt, .csv, .pts and .npy files";
+     or a folder of clouds or meshes in any format that srrf reads (.ply, .pcd, .off, .obj, .xyz, .csv, .npy, ...)";
 
 /// Why a source of shapes cannot be opened or sampled.
 #[derive(Debug, thiserror::Error)]

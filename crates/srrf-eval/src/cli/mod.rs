@@ -66,7 +66,7 @@ pub struct EvalOptions {
         value_delimiter = ',',
         value_parser = entry::<String>,
         help = help::METHODS,
-        long_help = format!("{}\n\n[default: identity, icp, oracle and the network with its branches]", help::METHODS)
+        long_help = format!("{}\n\n[default: identity, icp, oracle, the network with its branches, srrf-register and srrf-register-45]", help::METHODS)
     )]
     pub methods: Vec<String>,
 

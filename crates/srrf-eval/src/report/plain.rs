@@ -80,7 +80,8 @@ pub(crate) fn csv(summary: &Summary) -> String {
         ("pairs", |s| Some(s.pairs as f64)),
         ("failed", |s| Some(s.failed as f64)),
     ];
-    let certain: [(&str, fn(&SummaryRow) -> Option<f64>); 5] = [
+    type Field = fn(&SummaryRow) -> Option<f64>;
+    let certain: [(&str, Field); 5] = [
         ("right", |row| row.scores.right),
         ("brier", |row| Some(row.certainty?.brier)),
         ("calibration_error", |row| Some(row.certainty?.calibration_error)),

@@ -93,7 +93,8 @@ impl PairSource for SampledPairs<'_> {
     fn pair(&self, group: usize, item: usize) -> Result<EvalPair, EvalError> {
         let EvalPair { mut pair, clean } = self.clean.pair(0, item)?;
         let (name, choice, corresponding) = GROUPS[group];
-        let failed = |source: PairFault| EvalError::Pair { group: name.to_owned(), item, source };
+        let failed =
+            |source: PairFault| EvalError::Pair { group: name.to_owned(), item, source: Box::new(source) };
         let [source, mut target] = self.chosen(choice, item, &pair).map_err(failed)?;
         if corresponding {
             target = source.iter().map(|p| pair.target_from_source.apply(p)).collect();

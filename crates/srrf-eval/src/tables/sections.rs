@@ -1,6 +1,6 @@
 //! The report, put together from what was measured.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use srrf_cloud::{PointCloud, Register};
 use srrf_corrupt::Pair;
@@ -80,7 +80,7 @@ fn facts(options: &TablesOptions, evidence: &TablesEvidence) -> Vec<(String, Str
     let mut facts = Vec::new();
     let mut fact = |name: &str, value: String| facts.push((name.to_owned(), value));
     if let Some(measured) = evidence.parts.get("main").or_else(|| evidence.parts.values().next()) {
-        fact("Data", measured.data.clone());
+        fact("Data", without_place(options.data.as_deref(), &measured.data));
     }
     fact("Shapes", evidence.shapes.to_string());
     fact("Seed", options.seed.to_string());
@@ -90,13 +90,21 @@ fn facts(options: &TablesOptions, evidence: &TablesEvidence) -> Vec<(String, Str
     for (name, reason) in evidence.methods.left_out.iter().chain(&evidence.missing) {
         fact(&format!("Left out: {name}"), reason.clone());
     }
-    // The place of the program is no part of the command.
+    // The places of the program and of the data are no part of the command.
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    fact("Command", format!("srrf-eval {}", arguments.join(" ")));
+    fact("Command", without_place(options.data.as_deref(), &format!("srrf-eval {}", arguments.join(" "))));
     fact("Program", format!("srrf-eval {}, device {}", env!("CARGO_PKG_VERSION"), options.device));
     fact("Machine", crate::report::machine());
     fact("Time of all answers", format!("{:.0} s on one thread each", seconds(evidence)));
     facts
+}
+
+/// `text`, with `PATH` where it names the place of the data: pages are read elsewhere.
+fn without_place(data: Option<&Path>, text: &str) -> String {
+    match data.map(Path::to_string_lossy) {
+        Some(place) if !place.is_empty() => text.replace(&*place, "PATH"),
+        _ => text.to_owned(),
+    }
 }
 
 /// Sum of the times of all answers; branches of one answer count once.

@@ -69,6 +69,6 @@ pub(crate) fn methods(context: &MethodContext) -> Result<Vec<ReadyMethod>, EvalE
         let inner = SrrfRegister::new(loaded, srrf_model::device(&context.device)?);
         Ok(ReadyMethod { weights: Some(weights), settings, ..ReadyMethod::new(Named { inner, name }) })
     };
-    let named = |source: SetupError| EvalError::Setup { name: "srrf", source };
+    let named = |source: SetupError| EvalError::Setup { name: "srrf", source: Box::new(source) };
     VARIANTS.iter().map(|variant| set_up(variant).map_err(named)).collect()
 }

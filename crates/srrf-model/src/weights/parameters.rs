@@ -7,11 +7,14 @@ use burn::tensor::{Tensor, TensorData};
 
 use crate::ops::{CopyError, to_host};
 
-/// The parameters of a module by path, as `(shape, values)`.
+/// The shape and the values of each parameter, by its path.
+pub type ParametersByPath = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
+
+/// The parameters of a module by path.
 ///
 /// # Errors
 /// [`CopyError`] where the device does not give them.
-pub fn parameters<M: Module>(module: &M) -> Result<BTreeMap<String, (Vec<usize>, Vec<f32>)>, CopyError> {
+pub fn parameters<M: Module>(module: &M) -> Result<ParametersByPath, CopyError> {
     let mut collector = Collector { path: Vec::new(), found: Ok(BTreeMap::new()) };
     module.visit(&mut collector);
     collector.found
@@ -20,7 +23,7 @@ pub fn parameters<M: Module>(module: &M) -> Result<BTreeMap<String, (Vec<usize>,
 struct Collector {
     path: Vec<String>,
     /// Or the first error.
-    found: Result<BTreeMap<String, (Vec<usize>, Vec<f32>)>, CopyError>,
+    found: Result<ParametersByPath, CopyError>,
 }
 
 impl ModuleVisitor for Collector {
@@ -47,10 +50,7 @@ impl ModuleVisitor for Collector {
 /// # Errors
 /// The path and what is wrong with it, for the first parameter that is missing, has another shape,
 /// or is left over.
-pub fn with_parameters<M: Module>(
-    module: M,
-    values: BTreeMap<String, (Vec<usize>, Vec<f32>)>,
-) -> Result<M, (String, String)> {
+pub fn with_parameters<M: Module>(module: M, values: ParametersByPath) -> Result<M, (String, String)> {
     let mut applier = Applier { path: Vec::new(), values, failed: None };
     let module = module.map(&mut applier);
     if let Some(failed) = applier.failed {
@@ -64,7 +64,7 @@ pub fn with_parameters<M: Module>(
 
 struct Applier {
     path: Vec<String>,
-    values: BTreeMap<String, (Vec<usize>, Vec<f32>)>,
+    values: ParametersByPath,
     failed: Option<(String, String)>,
 }
 

@@ -29,7 +29,7 @@ struct Extracted {
 
 /// The skeleton of `cloud` by the network of `context`.
 fn extract(context: &MethodContext, cloud: &PointCloud) -> Result<Extracted, EvalError> {
-    let failed = |source: SetupError| EvalError::Setup { name: "srrf", source };
+    let failed = |source: SetupError| EvalError::Setup { name: "srrf", source: Box::new(source) };
     let (LoadedModel { model, .. }, _) = network(context).map_err(failed)?;
     let device = srrf_model::device(&context.device).map_err(|e| failed(e.into()))?;
     let batch = PairBatch::new(&[(cloud, cloud)], &device)
