@@ -84,7 +84,7 @@ pub enum TrainError {
         start: String,
         /// What is wrong with them.
         #[source]
-        source: WeightsError,
+        source: Box<WeightsError>,
     },
     /// The weights to start from are of another network.
     #[error(

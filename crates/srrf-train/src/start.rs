@@ -4,6 +4,7 @@ use burn::module::Module;
 use burn::optim::ModuleOptimizer;
 use burn::tensor::Device;
 use srrf_model::init;
+use srrf_model::weights::WeightsError;
 use srrf_model::weights::{parameters, with_parameters, write_atomically};
 
 use crate::checkpoint::{self, RunProgress};
@@ -84,7 +85,8 @@ fn starting_model<C: Trained>(
     for (part, start) in parts {
         let wrong = |name: String| TrainError::Start { start: start.clone(), name };
         let within = |name: &String| part.is_empty() || name.split('.').next() == Some(part);
-        let unread = |source| TrainError::StartFile { start: start.clone(), source };
+        let unread =
+            |source: WeightsError| TrainError::StartFile { start: start.clone(), source: Box::new(source) };
         let loaded = C::start(start, device).map_err(unread)?;
         let theirs: Vec<_> = parameters(&loaded)?.into_iter().filter(|(name, _)| within(name)).collect();
         if theirs.is_empty() {
