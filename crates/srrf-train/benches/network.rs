@@ -5,7 +5,7 @@
 //! cargo bench --profile dev -p srrf-train --bench network -- sfe    # one stage
 //! ```
 
-#![allow(clippy::expect_used, reason = "a benchmark stops where it cannot start")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a benchmark stops where it cannot start")]
 
 use std::path::Path;
 

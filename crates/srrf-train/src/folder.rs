@@ -10,6 +10,10 @@ use crate::error::TrainError;
 
 /// Where the files of a run go while another one that is to replace it has no checkpoint yet.
 const ASIDE: &str = "before-restart";
+/// In it, once all of the old run is there.
+const WHOLE: &str = "whole";
+/// What a folder holds of a run beside its checkpoint.
+const OTHERS: [&str; 5] = [CONFIG, BEST, LAST, crate::log::FILE, crate::log::PICTURE];
 /// Held by the training that is at work.
 const LOCK: &str = ".lock";
 /// What files are called while they are written; see [`srrf_cloud::io::write_atomically`].
@@ -67,7 +71,10 @@ impl RunFolder {
         if aside.is_dir() {
             match folder.path.join(checkpoint::FILE).exists() {
                 true => folder.forget()?,
-                false => folder.move_files(&aside, &folder.path).map_err(io(path))?,
+                false => {
+                    folder.clear_restarted(&aside).map_err(io(path))?;
+                    folder.move_files(&aside, &folder.path).map_err(io(path))?;
+                }
             }
         }
         Ok(folder)
@@ -76,8 +83,26 @@ impl RunFolder {
     /// Moves what the folder holds of a run aside; [`RunFolder::forget`] removes it.
     pub(crate) fn set_aside(&self) -> Result<(), TrainError> {
         let aside = self.path.join(ASIDE);
-        let moved = std::fs::create_dir_all(&aside).and_then(|()| self.move_files(&self.path, &aside));
+        let moved = std::fs::create_dir_all(&aside)
+            .and_then(|()| self.move_files(&self.path, &aside))
+            .and_then(|()| std::fs::write(aside.join(WHOLE), ""));
         moved.map_err(|source| TrainError::Io { path: aside, source })
+    }
+
+    /// Removes what a run that was started over, and has no checkpoint, left in the folder. It did so only if the old
+    /// run had been moved aside as a whole.
+    fn clear_restarted(&self, aside: &Path) -> std::io::Result<()> {
+        let whole = aside.join(WHOLE);
+        if !whole.exists() {
+            return Ok(());
+        }
+        for name in OTHERS {
+            match std::fs::remove_file(self.path.join(name)) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+        }
+        std::fs::remove_file(whole)
     }
 
     /// Removes what was moved aside, if anything was.
@@ -93,10 +118,9 @@ impl RunFolder {
 
     /// The checkpoint moves last in and first out, so that a kill in between leaves a run that can go on, or none.
     fn move_files(&self, from: &Path, to: &Path) -> std::io::Result<()> {
-        let others = [CONFIG, BEST, LAST, crate::log::FILE, crate::log::PICTURE];
         let names: Vec<&str> = match to == self.path {
-            true => others.into_iter().chain([checkpoint::FILE]).collect(),
-            false => [checkpoint::FILE].into_iter().chain(others).collect(),
+            true => OTHERS.into_iter().chain([checkpoint::FILE]).collect(),
+            false => [checkpoint::FILE].into_iter().chain(OTHERS).collect(),
         };
         for name in names {
             match std::fs::rename(from.join(name), to.join(name)) {

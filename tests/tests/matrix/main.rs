@@ -2,7 +2,7 @@
 //! clouds give the inverse, the order of the points and the number of threads do not matter, nothing that is not finite
 //! gets in or out, and clouds on a line are refused. What a method does not promise, and why, stands in `methods.rs`.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+#![allow(clippy::panic, clippy::unwrap_used, reason = "helpers of tests")]
 
 mod methods;
 

@@ -25,7 +25,7 @@ pub struct SweepRun {
 /// [`ConfigError`] where a file cannot be read, is no TOML, or has no such run.
 pub fn read_layers(path: &Path) -> Result<Layers, ConfigError> {
     let text = path.to_string_lossy();
-    let (list, name) = match text.split_once('#') {
+    let (list, name) = match text.rsplit_once('#') {
         Some((list, name)) if !path.exists() => (Path::new(list), Some(name)),
         _ => (path, None),
     };

@@ -60,7 +60,10 @@ pub fn run(args: &WeightsArgs) -> Result<ExitCode, Failure> {
         None | Some(WeightsCommand::List) => list()?,
         Some(WeightsCommand::Show { name, header: false }) => show(name)?.to_owned(),
         Some(WeightsCommand::Show { name, header: true }) => show_config(name)?,
-        Some(WeightsCommand::Write { name, used_as, output }) => write(name, used_as, output)?,
+        Some(WeightsCommand::Write { name, used_as, output }) => match write(name, used_as, output)? {
+            Some(said) => said,
+            None => return Ok(ExitCode::SUCCESS),
+        },
         Some(WeightsCommand::Verify { weights, sha256 }) => verify(weights, sha256.as_deref())?,
     };
     files::write(Path::new("-"), format!("{}\n", text.trim_end()).as_bytes())?;
@@ -92,14 +95,23 @@ fn show_config(name: &str) -> Result<String, Failure> {
 }
 
 /// Writes the weights `name` with the configuration of a file.
-fn write(name: &str, config: &Path, output: &Path) -> Result<String, Failure> {
+fn write(name: &str, used_as: &Path, output: &Path) -> Result<Option<String>, Failure> {
     files::check_output(output)?;
+    let place = |path: &Path| std::fs::canonicalize(path).ok();
+    if place(output)
+        .is_some_and(|out| place(used_as) == Some(out.clone()) || place(Path::new(name)) == Some(out))
+    {
+        return Err(Failure::usage(format!(
+            "{}: is read as well; choose another --output",
+            output.display()
+        )));
+    }
     let input = |source: std::io::Error, path: &Path| {
         Failure::usage(format!("{}: {source}", path.display())).because(source)
     };
-    let text = std::fs::read_to_string(config).map_err(|e| input(e, config))?;
+    let text = std::fs::read_to_string(used_as).map_err(|e| input(e, used_as))?;
     let changed: SrrfConfig = toml::from_str(&text).map_err(|e| {
-        Failure::usage(format!("{}: {}", config.display(), e.to_string().trim_end())).because(e)
+        Failure::usage(format!("{}: {}", used_as.display(), e.to_string().trim_end())).because(e)
     })?;
     let bytes = match embedded::model(name) {
         Some(model) => model.weights.bytes.to_vec(),
@@ -107,7 +119,10 @@ fn write(name: &str, config: &Path, output: &Path) -> Result<String, Failure> {
     };
     let written = with_config(&bytes, name, &changed).map_err(Failure::input)?;
     files::write(output, &written)?;
-    Ok(format!("wrote {}: {name} with the configuration of {}", output.display(), config.display()))
+    if output == Path::new("-") {
+        return Ok(None); // nothing else may follow the bytes
+    }
+    Ok(Some(format!("wrote {}: {name} with the configuration of {}", output.display(), used_as.display())))
 }
 
 fn verify(weights: &str, sha256: Option<&str>) -> Result<String, Failure> {

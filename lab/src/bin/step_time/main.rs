@@ -6,6 +6,7 @@
 //! ```
 //!
 //! One figure a process, so that the peak memory belongs to it.
+#![allow(clippy::unwrap_used, reason = "a benchmark")]
 
 mod clock;
 mod clouds;
