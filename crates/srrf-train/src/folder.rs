@@ -165,12 +165,14 @@ mod tests {
         folder.set_aside().unwrap();
         assert!(!path(checkpoint::FILE).exists() && path("mine.txt").exists());
         drop(folder);
-        // Killed before its first checkpoint: the old one is back.
+        // Killed before its first checkpoint: the old one is back, with nothing of the new one.
         write(CONFIG, "new");
+        write(BEST, "new best");
+        write(LAST, "new last");
         let folder = RunFolder::open(scratch.path()).unwrap();
         assert_eq!(std::fs::read_to_string(path(checkpoint::FILE)).unwrap(), "old");
         assert_eq!(std::fs::read_to_string(path(BEST)).unwrap(), "old best");
-        assert!(!path(ASIDE).exists());
+        assert!(!path(ASIDE).exists() && !path(CONFIG).exists() && !path(LAST).exists());
         // Killed after it: the new one stays.
         folder.set_aside().unwrap();
         write(checkpoint::FILE, "new");
