@@ -20,7 +20,7 @@ use srrf_train::{Existing, Overrides, train_layers};
 /// Trains the runs of a list, one after the other.
 #[derive(Parser)]
 struct Arguments {
-    /// The list: a TOML file with [[runs]].
+    /// The list: a TOML file with `[[runs]]`.
     list: PathBuf,
     /// Where ModelNet40 is.
     #[arg(long, env = "SRRF_DATA")]

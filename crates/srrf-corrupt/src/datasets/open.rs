@@ -8,7 +8,7 @@ use super::modelnet_hdf5;
 use super::source::{ShapeSource, Split};
 use super::{folder, modelnet_off, resampled_text};
 
-/// Opens the shapes at `path`: a data set in one of the accepted layouts ([`ACCEPTED_LAYOUTS`]), a
+/// Opens the shapes at `path`: a data set in one of the accepted layouts ([`ACCEPTED_LAYOUTS`](super::ACCEPTED_LAYOUTS)), a
 /// folder that contains one, or a single file (all of whose shapes are taken, whatever the split).
 ///
 /// ModelNet40's clouds and meshes come at mean 0 and radius 1; those of other files stay as they

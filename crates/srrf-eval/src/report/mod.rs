@@ -1,6 +1,6 @@
 //! What a run leaves: tables, curves, pictures and pages.
 //!
-//! A [`Sheet`](sheet::Sheet) is one table, as Markdown, CSV and HTML; `sheets` makes them from a summary. The plain run
+//! A `Sheet` is one table, as Markdown, CSV and HTML; `sheets` makes them from a summary. The plain run
 //! writes a few of them ([`write()`]); `srrf-eval tables` joins many, with curves and pictures, into a `document::Document`,
 //! which is written as one page, as Markdown, and as pages of the book.
 
