@@ -110,7 +110,7 @@ def readme_table(known):
     columns = ("right", "right_answered", "seconds", "peer", "peer_right", "peer_seconds")
     lines = [head, "|---|---|---|---|---|---|---|"]
     for row, words in ROWS:
-        lines.append(f"| {words} | " + " | ".join(cell(known.get(f"readme.{row}.{c}", "·"), c) for c in columns) + " |")
+        lines.append(f"| {words} | " + " | ".join(cell(known.get(f"readme.{row}.{c}", "not kept" if c.endswith("seconds") else "·"), c) for c in columns) + " |")
     return "\n".join(lines) + "\n"
 
 

@@ -150,7 +150,7 @@ fn probability_section(main: &Measured) -> Section {
 
 fn partial_section(partial: &Measured) -> Section {
     let mut section = Section::new("partial", "Partial overlap");
-    section.text.push(format!("{}. As in RPMNet's partial pairs.", partial.data));
+    section.text.push(format!("{}. The crop is that of RPMNet's partial pairs; theirs have noise as well, and here the clouds share exact points where they overlap, so that these pairs are easier.", partial.data));
     let title = "Clean pairs, of each of which a crop keeps 70 percent of the points";
     section.sheets.push(sheets::plain("partial", title, "", &partial.summary));
     section.sheets.extend(
