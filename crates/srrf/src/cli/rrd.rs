@@ -50,7 +50,7 @@ mod recording {
     use srrf_cloud::{PointCloud, Rigid};
 
     use super::{Failure, Input};
-    use crate::cli::files;
+    use srrf_args::files;
 
     const SOURCE: u32 = 0xD55E_00FF;
     const TARGET: u32 = 0x0072_B2FF;
