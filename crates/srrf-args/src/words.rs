@@ -30,16 +30,6 @@ pub fn points(n: usize) -> String {
     counted(n, "point")
 }
 
-/// `12.3 s`, `3 min 20 s`, `2 h 5 min`.
-pub fn duration(seconds: f64) -> String {
-    let whole = if seconds.is_finite() { seconds.round().max(0.0) as u64 } else { 0 };
-    match whole {
-        0..60 => format!("{seconds:.1} s"),
-        60..3600 => format!("{} min {} s", whole / 60, whole % 60),
-        _ => format!("{} h {} min", whole / 3600, whole / 60 % 60),
-    }
-}
-
 /// A length in `digits` significant digits, without an exponent for everyday sizes.
 pub fn length(value: f64, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
@@ -77,6 +67,5 @@ mod tests {
         }
         assert_eq!(vector([500_000.123_456, -2.0, 0.1], 1.3, 4), "(500000.123, -2.000, 0.100)");
         assert_eq!(grouped("-1.5"), "-1.5");
-        assert_eq!(["12.3 s", "3 min 20 s", "2 h 5 min"], [12.34, 200.2, 7520.0].map(duration));
     }
 }
