@@ -1,6 +1,6 @@
 //! A fuzzer without coverage, for toolchains that cannot build those in `fuzz/`: it mutates the same
 //! seeds with a seeded generator for `SRRF_FUZZ_SECONDS` (60) seconds and checks the same promises:
-//! `SRRF_FUZZ_SECONDS=600 cargo test -p srrf-cloud --features las,e57 --test io_fuzz -- --ignored`.
+//! `SRRF_FUZZ_SECONDS=600 cargo test -p srrf-cloud --test io_fuzz -- --ignored`.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "tests")]
 

@@ -15,11 +15,8 @@ const FORMATS: &[(&str, f64)] = &[
     ("npz", 1e-6),
     ("obj", 1e-6),
     ("off", 1e-6),
-    #[cfg(feature = "las")]
     ("las", 1e-3),
-    #[cfg(feature = "las")]
     ("laz", 1e-3),
-    #[cfg(feature = "e57")]
     ("e57", 1e-6),
 ];
 
@@ -56,14 +53,4 @@ fn a_recording() {
     let bytes = std::fs::read(scene.path("out.rrd")).unwrap();
     assert_eq!(&bytes[..3], b"RRF");
     assert!(bytes.len() > 3 * 700 * 12, "{} bytes", bytes.len());
-}
-
-/// A format that this build leaves out is refused with the way to get it.
-#[cfg(not(feature = "las"))]
-#[test]
-fn a_format_left_out_names_its_feature() {
-    let scene = Scene::new(33);
-    scene.file("cloud.las", "LASF");
-    let done = scene.srrf(&["register", "cloud.las", "target.ply", "-o", "t.txt"]);
-    assert!(done.code == 2 && done.err.contains("las") && done.err.contains("feature"), "{done:?}");
 }
