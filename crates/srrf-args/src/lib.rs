@@ -19,5 +19,5 @@ pub mod words;
 pub use exit::{ABSTAINED, EXIT_CODES, FAILED, INTERRUPTED, USAGE};
 pub use failure::Failure;
 pub use output::Output;
-pub use program::run_program;
+pub use program::{run_program, run_program_with};
 pub use scripts::Scripts;

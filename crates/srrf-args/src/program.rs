@@ -11,7 +11,15 @@ use crate::failure::Failure;
 /// Parses the arguments of the process, does what they ask for, and turns a failure into a message on standard error
 /// and an exit code. Help and version end with 0, arguments that cannot be parsed with 2.
 pub fn run_program<A: Parser>(work: impl FnOnce(A) -> Result<ExitCode, Failure>) -> ExitCode {
-    run_on(std::env::args_os(), work, &mut std::io::stderr())
+    run_program_with(std::env::args_os(), work)
+}
+
+/// As [`run_program`], with these arguments; the first is the program's name.
+pub fn run_program_with<A: Parser>(
+    arguments: impl IntoIterator<Item = OsString>,
+    work: impl FnOnce(A) -> Result<ExitCode, Failure>,
+) -> ExitCode {
+    run_on(arguments, work, &mut std::io::stderr())
 }
 
 fn run_on<A: Parser>(

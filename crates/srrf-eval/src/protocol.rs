@@ -153,9 +153,46 @@ impl SynthesizedPairs {
         let groups = groups.collect();
         Ok(Self { source, shapes, synthesizer, protocol, conditions, groups })
     }
-}
 
-impl SynthesizedPairs {
+    /// As [`PairSource::pair`], without the clean shape.
+    ///
+    /// # Errors
+    /// [`EvalError::Pair`] where it cannot be made.
+    pub fn bare_pair(&self, group: usize, item: usize) -> Result<Pair, EvalError> {
+        let (shape, stream) = self.shape(group, item);
+        let pose = if self.protocol.dcp_poses { PoseDraw::DcpTest(shape as u32) } else { PoseDraw::Seeded };
+        let shapes = &*self.source;
+        let pair = match self.conditions[group] {
+            Condition::Clean => self.synthesizer.pair(shapes, shape, None, pose, stream),
+            Condition::Corrupted(kind, severity) => {
+                self.synthesizer.pair(shapes, shape, Some((kind, severity)), pose, stream)
+            }
+            Condition::Mixed(mixture, severity) => {
+                let corruption = mixture.corruption(&self.synthesizer.config().variants);
+                self.synthesizer.pair_with(shapes, shape, Some((&*corruption, severity)), pose, stream)
+            }
+        };
+        let named = |e: srrf_corrupt::PairError| EvalError::Pair {
+            group: self.groups[group].name(),
+            item,
+            source: Box::new(e.into()),
+        };
+        let mut pair = pair.map_err(named)?;
+        if let Some(keep) = self.protocol.crop {
+            crop_pair(&mut pair, keep, stream).map_err(|source| {
+                named(srrf_corrupt::PairError::Cloud { id: self.source.id(shape), source })
+            })?;
+        }
+        Ok(pair)
+    }
+
+    /// The shape of a pair, and its random numbers.
+    fn shape(&self, group: usize, item: usize) -> (usize, Stream) {
+        let step = self.protocol.step(self.conditions[group]);
+        let shape = self.shapes[step.first + item * step.by];
+        (shape, Stream { seed: self.protocol.seed, item: shape as u64 })
+    }
+
     /// The points from which the pair was made. `None` with box normalisation, which moves and scales
     /// clouds against their clean shape.
     fn clean(&self, shape: usize, stream: Stream) -> Result<Option<Vec<[f64; 3]>>, EvalError> {
@@ -214,33 +251,8 @@ impl PairSource for SynthesizedPairs {
     }
 
     fn pair(&self, group: usize, item: usize) -> Result<EvalPair, EvalError> {
-        let step = self.protocol.step(self.conditions[group]);
-        let shape = self.shapes[step.first + item * step.by];
-        let stream = Stream { seed: self.protocol.seed, item: shape as u64 };
-        let pose = if self.protocol.dcp_poses { PoseDraw::DcpTest(shape as u32) } else { PoseDraw::Seeded };
-        let shapes = &*self.source;
-        let pair = match self.conditions[group] {
-            Condition::Clean => self.synthesizer.pair(shapes, shape, None, pose, stream),
-            Condition::Corrupted(kind, severity) => {
-                self.synthesizer.pair(shapes, shape, Some((kind, severity)), pose, stream)
-            }
-            Condition::Mixed(mixture, severity) => {
-                let corruption = mixture.corruption(&self.synthesizer.config().variants);
-                self.synthesizer.pair_with(shapes, shape, Some((&*corruption, severity)), pose, stream)
-            }
-        };
-        let named = |e: srrf_corrupt::PairError| EvalError::Pair {
-            group: self.groups[group].name(),
-            item,
-            source: Box::new(e.into()),
-        };
-        let mut pair = pair.map_err(named)?;
-        if let Some(keep) = self.protocol.crop {
-            crop_pair(&mut pair, keep, stream).map_err(|source| {
-                named(srrf_corrupt::PairError::Cloud { id: self.source.id(shape), source })
-            })?;
-        }
-        Ok(EvalPair { pair, clean: self.clean(shape, stream)? })
+        let (shape, stream) = self.shape(group, item);
+        Ok(EvalPair { pair: self.bare_pair(group, item)?, clean: self.clean(shape, stream)? })
     }
 }
 

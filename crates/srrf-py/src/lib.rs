@@ -1,9 +1,39 @@
-//! The Python module of SRRF.
+//! The compiled part of the Python package `srrf`.
+//!
+//! The package's own files (`python/srrf`) hold what a user sees: its classes, their documentation and types. Here is
+//! what they call: clouds are copied out of NumPy once ([`cloud`]), the work runs without the interpreter's lock on
+//! threads of its own ([`work`]), and what goes wrong becomes an exception of the package ([`refusal`]).
 
 use pyo3::prelude::*;
+
+mod cloud;
+mod corruption;
+mod files;
+mod options;
+mod pairs;
+mod picture;
+mod pose;
+mod program;
+mod refusal;
+mod registrar;
+mod score;
+mod work;
 
 /// The compiled part of the Python package `srrf`.
 #[pymodule]
 fn _srrf(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("__version__", env!("CARGO_PKG_VERSION"))
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("CORRUPTIONS", corruption::names())?;
+    module.add("FORMATS", srrf_cloud::io::format_names())?;
+    module.add_class::<cloud::Cloud>()?;
+    module.add_class::<registrar::Registrar>()?;
+    module.add_class::<registrar::Target>()?;
+    module.add_class::<pairs::Pairs>()?;
+    module.add_function(wrap_pyfunction!(corruption::corrupt, module)?)?;
+    module.add_function(wrap_pyfunction!(files::read, module)?)?;
+    module.add_function(wrap_pyfunction!(files::write, module)?)?;
+    module.add_function(wrap_pyfunction!(picture::page, module)?)?;
+    module.add_function(wrap_pyfunction!(pose::rigid_motion, module)?)?;
+    module.add_function(wrap_pyfunction!(program::program, module)?)?;
+    module.add_function(wrap_pyfunction!(score::score, module)?)
 }

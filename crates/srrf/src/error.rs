@@ -34,6 +34,9 @@ pub enum Error {
     /// No method found a pose.
     #[error("no pose found: {0}")]
     NoPose(#[source] NoPose),
+    /// Another thread set the flag of [`crate::Request::until`].
+    #[error("stopped")]
+    Stopped,
     /// The skeleton that the network found is not finite.
     #[error("no skeleton found: it is not finite; are the coordinates extreme?")]
     NoSkeleton,

@@ -4,5 +4,5 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     srrf_model::keep_freed_memory();
-    srrf_args::run_program(srrf::cli::run)
+    srrf_args::run_program_with(srrf::cli::arguments(std::env::args_os()), srrf::cli::run)
 }

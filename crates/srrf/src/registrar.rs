@@ -71,6 +71,9 @@ impl Registrar {
         let mut search = Search::new(&pair, self.options.refine.is_some(), clock);
         let mut answer = None;
         for (round, sources) in &self.rounds {
+            if request.is_stopped() {
+                return Err(Error::Stopped);
+            }
             search.propose(sources).map_err(Error::Refine)?;
             let Some(best) = search.best(round.refining()).map_err(Error::Refine)? else { continue };
             let judgement = self.judge.judge(&best.features);

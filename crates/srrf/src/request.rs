@@ -1,5 +1,7 @@
 //! [`Request`]: what is to be registered.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use srrf_cloud::{PointCloud, Rigid};
 
 use crate::target::Target;
@@ -13,6 +15,8 @@ pub struct Request<'a> {
     pub target: RequestTarget<'a>,
     /// A first guess of `target_from_source`, in input coordinates; none stands for the identity.
     pub initial: Option<Rigid>,
+    /// A flag that ends the search with [`crate::Error::Stopped`] where another thread sets it; looked at between rounds.
+    pub stop: Option<&'a AtomicBool>,
 }
 
 /// A target as it is, or one that [`crate::Registrar::prepare`] made ready.
@@ -27,12 +31,22 @@ pub enum RequestTarget<'a> {
 impl<'a> Request<'a> {
     /// Without a first guess. `target` is a cloud or a prepared [`Target`].
     pub fn new(source: &'a PointCloud, target: impl Into<RequestTarget<'a>>) -> Self {
-        Self { source, target: target.into(), initial: None }
+        Self { source, target: target.into(), initial: None, stop: None }
     }
 
     /// With a first guess.
     pub fn with_initial(self, target_from_source: Rigid) -> Self {
         Self { initial: Some(target_from_source), ..self }
+    }
+
+    /// With a flag by which another thread ends the search.
+    pub fn until(self, stop: &'a AtomicBool) -> Self {
+        Self { stop: Some(stop), ..self }
+    }
+
+    /// Whether the search is to end.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
     }
 }
 

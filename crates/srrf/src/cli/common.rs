@@ -41,6 +41,7 @@ pub fn failed(error: srrf::Error, source: &str, target: &str) -> Failure {
         srrf::Error::Target(e) => Failure::cloud(target, &e),
         srrf::Error::Weights(_) | srrf::Error::Device(_) | srrf::Error::Calibration(_) => unusable(error),
         srrf::Error::Copy(e) => Failure::other(e),
+        srrf::Error::Stopped => Failure::other(error),
         srrf::Error::NoPose(_) | srrf::Error::NoSkeleton | srrf::Error::Refine(_) => Failure::failed(format!(
             "{source:?} and {target:?}: {error}; look at both with `srrf inspect`, or give a first guess with --initial"
         ))

@@ -1,5 +1,7 @@
 //! The command line: one module a verb.
 
+use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
@@ -23,6 +25,8 @@ mod view;
 mod weights;
 
 use common::EXIT_CODES;
+
+pub use common::to_json as answer_json;
 
 /// Registers two point clouds, says whether it worked, and shows it.
 #[derive(Debug, Parser)]
@@ -50,6 +54,17 @@ pub fn command() -> clap::Command {
     Cli::command()
 }
 
+/// The arguments as the program takes them: two files without a verb are registered, as `srrf a.ply b.ply`.
+pub fn arguments(given: impl IntoIterator<Item = OsString>) -> Vec<OsString> {
+    let mut arguments: Vec<OsString> = given.into_iter().collect();
+    let verb =
+        |first: &OsString| first.to_str().is_some_and(|name| command().find_subcommand(name).is_some());
+    if arguments.get(1).is_some_and(|first| Path::new(first).is_file() && !verb(first)) {
+        arguments.insert(1, "register".into());
+    }
+    arguments
+}
+
 /// Does what was asked.
 ///
 /// # Errors
@@ -70,6 +85,18 @@ pub fn run(cli: Cli) -> Result<ExitCode, Failure> {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn two_files_alone_are_registered() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let given = ["srrf".into(), file.path().as_os_str().to_owned(), "b.ply".into()];
+        let taken = super::arguments(given.clone());
+        assert_eq!((&taken[0], &taken[1], &taken[2..]), (&given[0], &"register".into(), &given[1..]));
+        for verb in ["inspect", "--version", "no-file.ply"] {
+            let given: Vec<std::ffi::OsString> = vec!["srrf".into(), verb.into(), "b.ply".into()];
+            assert_eq!(super::arguments(given.clone()), given);
+        }
+    }
+
     #[test]
     fn options_do_not_clash() {
         super::command().debug_assert();

@@ -1,0 +1,242 @@
+//! Pairs of the corruption benchmark, as arrays.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use numpy::{IntoPyArray, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+use srrf_corrupt::datasets::{self, ShapeSource, Split};
+use srrf_corrupt::shapes::ProceduralShapes;
+use srrf_corrupt::{Pair, PairConfig, RotationRange};
+use srrf_eval::{CLEAN, PairSource, Protocol, SynthesizedPairs, data};
+
+use crate::cloud::{origins, to_array};
+use crate::corruption;
+use crate::pose;
+use crate::refusal::{Fault, Refusal};
+use crate::work;
+
+/// Pairs that are made when they are asked for.
+#[pyclass(frozen, module = "srrf._srrf")]
+pub struct Pairs {
+    inner: Arc<SynthesizedPairs>,
+    /// Group and item of each pair.
+    places: Arc<Vec<(usize, usize)>>,
+    threads: usize,
+}
+
+/// What one of the words of a configuration stands for.
+fn word<T: serde::de::DeserializeOwned>(name: &str, value: &str, known: &str) -> Result<T, Refusal> {
+    serde_json::from_value(serde_json::Value::from(value))
+        .map_err(|_| Refusal::new(Fault::Option, format!("{name} is `{value}`: use one of {known}")))
+}
+
+#[pymethods]
+impl Pairs {
+    #[new]
+    #[pyo3(signature = (
+        *, shapes, corruptions, severities, clean, data, split, seed, points, rotation_deg, translation, corrupt,
+        sampling, normalize, reading, crop, dcp_poses, spread, num_threads
+    ))]
+    #[allow(clippy::too_many_arguments, reason = "one for each option")]
+    fn new(
+        py: Python<'_>,
+        shapes: usize,
+        corruptions: Vec<String>,
+        severities: Vec<i64>,
+        clean: bool,
+        data: Option<PathBuf>,
+        split: &str,
+        seed: u64,
+        points: usize,
+        rotation_deg: Option<f64>,
+        translation: f64,
+        corrupt: &str,
+        sampling: &str,
+        normalize: &str,
+        reading: &str,
+        crop: Option<f64>,
+        dcp_poses: bool,
+        spread: bool,
+        num_threads: Option<i64>,
+    ) -> PyResult<Self> {
+        let threads = work::threads(num_threads)?;
+        let pair = PairConfig {
+            corrupt: word("corrupt", corrupt, "both, source, target")?,
+            sampling: word("sampling", sampling, "shared, independent")?,
+            normalize: word("normalize", normalize, "none, canonical, after_pose")?,
+            rotation: rotation_deg.map_or(RotationRange::So3, |max_deg| RotationRange::EulerAxes { max_deg }),
+            translation,
+            points,
+            keep_correspondence: true,
+            variants: corruption::variants(reading)?,
+        };
+        let protocol = Protocol {
+            clean,
+            corruptions: corruptions.iter().map(|name| corruption::kind(name)).collect::<Result<_, _>>()?,
+            mixtures: Vec::new(),
+            severities: severities.iter().map(|n| corruption::severity(*n)).collect::<Result<_, _>>()?,
+            shapes,
+            seed,
+            pair,
+            crop,
+            dcp_poses,
+            spread,
+        };
+        let split = split.to_owned();
+        let inner = work::run(py, threads, move |_| {
+            let source = open(data, &split, shapes, seed)?;
+            Ok(SynthesizedPairs::new(source, protocol)?)
+        })?;
+        let items = |(group, of): (usize, &srrf_eval::Group)| (0..of.pairs).map(move |item| (group, item));
+        let places = inner.groups().iter().enumerate().flat_map(items).collect();
+        Ok(Self { inner: Arc::new(inner), places: Arc::new(places), threads })
+    }
+
+    fn __len__(&self) -> usize {
+        self.places.len()
+    }
+
+    /// One line on the data and the protocol.
+    fn description(&self) -> String {
+        self.inner.description()
+    }
+
+    /// Pair `index` as a dictionary of arrays.
+    fn pair<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyDict>> {
+        let (inner, places) = (Arc::clone(&self.inner), Arc::clone(&self.places));
+        let (group, item) = places[index];
+        let made = work::run(py, 1, move |_| Ok(inner.bare_pair(group, item)?))?;
+        let dict = self.described(py, &made, group)?;
+        dict.set_item("target_from_source", pose::matrix(py, &made.target_from_source)?)?;
+        for (name, origin) in [("source_origin", &made.source_origin), ("target_origin", &made.target_origin)]
+        {
+            dict.set_item(name, origin.as_ref().map(|origin| origins(py, origin)))?;
+        }
+        dict.set_item("source", to_array(py, made.source.into_points())?)?;
+        dict.set_item("target", to_array(py, made.target.into_points())?)?;
+        Ok(dict)
+    }
+
+    /// The pairs of these indices, stacked: made in parallel.
+    fn arrays<'py>(&self, py: Python<'py>, indices: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
+        let (inner, places) = (Arc::clone(&self.inner), Arc::clone(&self.places));
+        let chosen: Vec<(usize, usize)> = indices.iter().map(|i| places[*i]).collect();
+        let of = chosen.clone();
+        let made = work::run(py, self.threads, move |stop| {
+            let make = |(group, item): &(usize, usize)| {
+                if stop.load(Ordering::Relaxed) {
+                    return Err(Refusal::new(Fault::Internal, "stopped"));
+                }
+                Ok(inner.bare_pair(*group, *item)?)
+            };
+            let pairs: Vec<Pair> = of.par_iter().map(make).collect::<Result<_, Refusal>>()?;
+            Stacked::new(&pairs)
+        })?;
+        let dict = PyDict::new(py);
+        let n = chosen.len();
+        let corruption: Vec<&str> =
+            chosen.iter().map(|(g, _)| &*self.inner.groups()[*g].corruption).collect();
+        let severity: Vec<i64> =
+            chosen.iter().map(|(g, _)| i64::from(self.inner.groups()[*g].severity)).collect();
+        dict.set_item("source", made.source.into_pyarray(py).reshape([n, made.points[0], 3])?)?;
+        dict.set_item("target", made.target.into_pyarray(py).reshape([n, made.points[1], 3])?)?;
+        dict.set_item("target_from_source", made.poses.into_pyarray(py).reshape([n, 4, 4])?)?;
+        dict.set_item(
+            "source_origin",
+            made.source_origin.map(|o| o.into_pyarray(py).reshape([n, made.points[0]])).transpose()?,
+        )?;
+        dict.set_item(
+            "target_origin",
+            made.target_origin.map(|o| o.into_pyarray(py).reshape([n, made.points[1]])).transpose()?,
+        )?;
+        dict.set_item("corruption", corruption)?;
+        dict.set_item("severity", severity.into_pyarray(py))?;
+        dict.set_item("shape", made.shapes)?;
+        dict.set_item("class_name", made.classes)?;
+        dict.set_item("symmetric", made.symmetric.into_pyarray(py))?;
+        Ok(dict)
+    }
+}
+
+impl Pairs {
+    fn described<'py>(&self, py: Python<'py>, pair: &Pair, group: usize) -> PyResult<Bound<'py, PyDict>> {
+        let of = &self.inner.groups()[group];
+        let dict = PyDict::new(py);
+        dict.set_item("corruption", if of.corruption == CLEAN { CLEAN } else { &of.corruption })?;
+        dict.set_item("severity", of.severity)?;
+        dict.set_item("shape", &pair.id)?;
+        dict.set_item("class_name", &pair.class)?;
+        dict.set_item("symmetric", pair.symmetric)?;
+        Ok(dict)
+    }
+}
+
+/// The shapes: those that are scored, or those that are learned from.
+fn open(
+    data: Option<PathBuf>,
+    split: &str,
+    shapes: usize,
+    seed: u64,
+) -> Result<Box<dyn ShapeSource>, Refusal> {
+    let no_shapes = |e: datasets::SourceError| Refusal::new(Fault::Input, e.to_string());
+    match (split, data) {
+        ("test", data) => Ok(data::open(data.as_deref(), shapes)?),
+        ("train", Some(path)) => {
+            datasets::open(&path, Split::Train).map_err(|e| Refusal::new(Fault::File, e.to_string()))
+        }
+        ("train", None) => Ok(Box::new(ProceduralShapes::new(seed, shapes, None).map_err(no_shapes)?)),
+        _ => Err(Refusal::new(Fault::Option, format!("split is `{split}`: use test or train"))),
+    }
+}
+
+/// Many pairs in few arrays.
+struct Stacked {
+    points: [usize; 2],
+    source: Vec<f64>,
+    target: Vec<f64>,
+    poses: Vec<f64>,
+    source_origin: Option<Vec<i64>>,
+    target_origin: Option<Vec<i64>>,
+    shapes: Vec<String>,
+    classes: Vec<String>,
+    symmetric: Vec<bool>,
+}
+
+impl Stacked {
+    fn new(pairs: &[Pair]) -> Result<Self, Refusal> {
+        let points = pairs.first().map_or([0; 2], |pair| [pair.source.len(), pair.target.len()]);
+        if pairs.iter().any(|pair| [pair.source.len(), pair.target.len()] != points) {
+            return Err(Refusal::new(
+                Fault::Input,
+                "the clouds differ in size, so that they do not stack; take the pairs one by one",
+            ));
+        }
+        let all = |of: fn(&Pair) -> &[[f64; 3]]| {
+            pairs.iter().flat_map(|pair| of(pair).as_flattened()).copied().collect()
+        };
+        let origin = |of: fn(&Pair) -> &Option<Vec<Option<u32>>>| -> Option<Vec<i64>> {
+            let rows: Option<Vec<_>> = pairs.iter().map(|pair| of(pair).as_deref()).collect();
+            Some(rows?.into_iter().flatten().map(|o| o.map_or(-1, i64::from)).collect())
+        };
+        Ok(Self {
+            points,
+            source: all(|pair| pair.source.points()),
+            target: all(|pair| pair.target.points()),
+            // nalgebra stores columns.
+            poses: pairs
+                .iter()
+                .flat_map(|pair| <[[f64; 4]; 4]>::from(pair.target_from_source.to_matrix4().transpose()))
+                .flatten()
+                .collect(),
+            source_origin: origin(|pair| &pair.source_origin),
+            target_origin: origin(|pair| &pair.target_origin),
+            shapes: pairs.iter().map(|pair| pair.id.clone()).collect(),
+            classes: pairs.iter().map(|pair| pair.class.clone()).collect(),
+            symmetric: pairs.iter().map(|pair| pair.symmetric).collect(),
+        })
+    }
+}

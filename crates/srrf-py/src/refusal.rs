@@ -1,0 +1,135 @@
+//! [`Refusal`]: why a call fails, and which exception of the package says so.
+
+use std::error::Error;
+use std::fmt;
+
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use srrf_cloud::CloudError;
+use srrf_cloud::io::IoError;
+use srrf_corrupt::{CorruptError, PairError};
+use srrf_eval::EvalError;
+
+/// The classes of exceptions; they stand in `python/srrf/_errors.py` by these names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fault {
+    /// A cloud or a pose that cannot be used.
+    Input,
+    /// An option that makes no sense, or weights or a device that cannot be used.
+    Option,
+    /// A file that cannot be read or written.
+    File,
+    /// A file that is not there.
+    MissingFile,
+    /// Two clouds without an answer.
+    NoPose,
+    /// A fault of the library.
+    Internal,
+}
+
+impl Fault {
+    fn class(self) -> &'static str {
+        match self {
+            Self::Input => "InputError",
+            Self::Option => "OptionError",
+            Self::File => "FileError",
+            Self::MissingFile => "MissingFileError",
+            Self::NoPose => "NoPoseError",
+            Self::Internal => "InternalError",
+        }
+    }
+}
+
+/// Why a call fails.
+#[derive(Debug)]
+pub struct Refusal {
+    fault: Fault,
+    message: String,
+}
+
+impl Refusal {
+    /// With a message that says the fact and the way out.
+    pub fn new(fault: Fault, message: impl Into<String>) -> Self {
+        Self { fault, message: message.into() }
+    }
+
+    /// A cloud, by its name, that cannot be used.
+    pub fn cloud(name: &str, error: &CloudError) -> Self {
+        let way_out = match error {
+            CloudError::Empty => "pass an array with at least one row",
+            CloudError::NotFinite { .. } => "remove such points first",
+            CloudError::TooFew { .. } | CloudError::Collinear => {
+                "pass three points or more that are not on one line"
+            }
+        };
+        Self::new(Fault::Input, format!("{name}: {error}; {way_out}"))
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl Error for Refusal {}
+
+impl From<Refusal> for PyErr {
+    fn from(refusal: Refusal) -> Self {
+        Python::attach(|py| {
+            let class = py.import("srrf._errors").and_then(|errors| errors.getattr(refusal.fault.class()));
+            match class.and_then(|class| class.call1((&refusal.message,))) {
+                Ok(exception) => PyErr::from_value(exception),
+                Err(_) => PyRuntimeError::new_err(refusal.message),
+            }
+        })
+    }
+}
+
+impl From<srrf::Error> for Refusal {
+    fn from(error: srrf::Error) -> Self {
+        use srrf::Error as E;
+        let message = error.to_string();
+        match error {
+            E::Source(e) => Self::cloud("source", &e),
+            E::Target(e) => Self::cloud("target", &e),
+            E::Weights(_) | E::Device(_) | E::Calibration(_) => Self::new(Fault::Option, message),
+            E::NoPose(_) | E::NoSkeleton | E::Refine(_) => Self::new(
+                Fault::NoPose,
+                format!("{message}; look at both clouds, or give a first guess by `initial`"),
+            ),
+            _ => Self::new(Fault::Internal, message),
+        }
+    }
+}
+
+impl From<IoError> for Refusal {
+    fn from(error: IoError) -> Self {
+        let missing =
+            matches!(&error, IoError::Read { source, .. } if source.kind() == std::io::ErrorKind::NotFound);
+        Self::new(if missing { Fault::MissingFile } else { Fault::File }, error.to_string())
+    }
+}
+
+impl From<CorruptError> for Refusal {
+    fn from(error: CorruptError) -> Self {
+        Self::new(Fault::Input, format!("{error}; pass a larger cloud, or take another corruption"))
+    }
+}
+
+impl From<PairError> for Refusal {
+    fn from(error: PairError) -> Self {
+        Self::new(Fault::Input, error.to_string())
+    }
+}
+
+impl From<EvalError> for Refusal {
+    fn from(error: EvalError) -> Self {
+        let fault = match error {
+            EvalError::Usage(_) => Fault::Option,
+            EvalError::Data { .. } => Fault::File,
+            _ => Fault::Input,
+        };
+        Self::new(fault, error.to_string())
+    }
+}

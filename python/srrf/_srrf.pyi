@@ -1,0 +1,80 @@
+"""The compiled part of the package. Its interface may change: use ``srrf`` itself."""
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+from numpy.typing import NDArray
+import numpy as np
+
+__version__: str
+CORRUPTIONS: list[str]
+FORMATS: list[str]
+
+class Cloud:
+    name: str
+    dropped: int
+    def __init__(self, array: NDArray[Any], name: str) -> None: ...
+    def __len__(self) -> int: ...
+    def points(self) -> NDArray[np.float64]: ...
+
+class Registrar:
+    def __init__(
+        self,
+        *,
+        method: str,
+        rotation: str,
+        refine: bool,
+        weights: str | None,
+        device: str,
+        seed: int,
+        abstain_below: float,
+        num_threads: int | None,
+    ) -> None: ...
+    def prepare(self, target: Cloud) -> Target: ...
+    def register(self, source: Cloud, target: Cloud | Target, initial: NDArray[np.float64] | None = None) -> str: ...
+
+class Target:
+    cloud: Cloud
+
+class Pairs:
+    def __init__(
+        self,
+        *,
+        shapes: int,
+        corruptions: Sequence[str],
+        severities: Sequence[int],
+        clean: bool,
+        data: str | None,
+        split: str,
+        seed: int,
+        points: int,
+        rotation_deg: float | None,
+        translation: float,
+        corrupt: str,
+        sampling: str,
+        normalize: str,
+        reading: str,
+        crop: float | None,
+        dcp_poses: bool,
+        spread: bool,
+        num_threads: int | None,
+    ) -> None: ...
+    def __len__(self) -> int: ...
+    def description(self) -> str: ...
+    def pair(self, index: int) -> dict[str, Any]: ...
+    def arrays(self, indices: Sequence[int]) -> dict[str, Any]: ...
+
+def corrupt(
+    cloud: Cloud, name: str, number: int, seed: int, reading: str
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]: ...
+def read(path: str | os.PathLike[str]) -> NDArray[np.float64]: ...
+def write(path: str | os.PathLike[str], cloud: Cloud) -> None: ...
+def page(answer: str, source: Cloud, target: Cloud, unit: str, up: str) -> str: ...
+def rigid_motion(pose: NDArray[np.float64], name: str) -> NDArray[np.float64]: ...
+def program(arguments: Sequence[str]) -> int: ...
+def score(
+    poses: Sequence[NDArray[np.float64] | None],
+    truth: Sequence[NDArray[np.float64]],
+    clouds: Sequence[tuple[Cloud, Cloud]] | None = None,
+) -> str: ...
