@@ -21,6 +21,7 @@ impl Asked {
     ///
     /// # Errors
     /// [`Fault::Option`] names the one that makes no sense.
+    #[allow(clippy::needless_update, reason = "options to come keep their defaults")]
     pub fn options(self) -> Result<Options, Refusal> {
         let refuse = |message: String| Refusal::new(Fault::Option, message);
         let method: Method = self.method.parse().map_err(|e: srrf::OptionsError| refuse(e.to_string()))?;
