@@ -52,6 +52,12 @@ impl PointCloud {
         }
     }
 
+    /// Takes points that are known to be finite, at least one.
+    pub(crate) fn from_finite(points: Vec<[f64; 3]>) -> Self {
+        debug_assert!(!points.is_empty() && points.iter().flatten().all(|c| c.is_finite()));
+        Self { points }
+    }
+
     /// The points, shape `[n, 3]`.
     pub fn points(&self) -> &[[f64; 3]] {
         &self.points
@@ -88,6 +94,14 @@ impl PointCloud {
     /// The cloud moved by `pose`: each point `p` becomes `R p + t`.
     pub fn transformed(&self, pose: &Rigid) -> Self {
         Self { points: self.points.iter().map(|p| pose.apply(p)).collect() }
+    }
+
+    /// The cloud with its coordinates multiplied by `factor`, as for another unit of length.
+    ///
+    /// # Errors
+    /// [`CloudError::NotFinite`] where a coordinate becomes too large, or the factor is NaN or infinite.
+    pub fn scaled(&self, factor: f64) -> Result<Self, CloudError> {
+        Self::new(self.points.iter().map(|p| p.map(|c| c * factor)).collect())
     }
 
     /// The cloud centred on its mean and scaled so that its farthest point has norm 1, with what
@@ -132,6 +146,14 @@ mod tests {
         assert_eq!(PointCloud::new(vec![]), Err(CloudError::Empty));
         let bad = PointCloud::new(vec![[0.0; 3], [0.0, f64::NAN, 1.0]]);
         assert!(matches!(bad, Err(CloudError::NotFinite { index: 1, .. })));
+    }
+
+    #[test]
+    fn scaled_for_another_unit() {
+        let cloud = PointCloud::new(vec![[1.0, -2.0, 3.5], [1e300, 0.0, 0.0]]).unwrap();
+        assert_eq!(cloud.scaled(0.5).unwrap().points(), [[0.5, -1.0, 1.75], [5e299, 0.0, 0.0]]);
+        assert!(matches!(cloud.scaled(1e9), Err(CloudError::NotFinite { index: 1, .. })));
+        assert!(cloud.scaled(f64::NAN).is_err());
     }
 
     #[test]

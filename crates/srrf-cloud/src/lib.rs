@@ -11,6 +11,7 @@ mod euler;
 mod fps;
 mod frame;
 pub mod io;
+mod mesh;
 mod neighbours;
 mod normals;
 pub mod profile;
@@ -19,6 +20,7 @@ mod right;
 mod rigid;
 mod solid;
 mod triangles;
+mod unit;
 mod voxel;
 
 pub use centred::CentredCloud;
@@ -26,6 +28,7 @@ pub use cloud::{CloudError, PointCloud, UnitSphere};
 pub use euler::EulerXyz;
 pub use fps::farthest_point_sampling;
 pub use frame::PairFrame;
+pub use mesh::{LEAST_SAMPLES, MOST_SAMPLES, MeshError, TriangleMesh};
 pub use neighbours::KnnIndex;
 pub use normals::estimate_normals;
 pub use register::{
@@ -35,4 +38,5 @@ pub use right::{RIGHT_IN_WORDS, RIGHT_RADIUS_SHARE, RIGHT_ROTATION_DEG, is_right
 pub use rigid::Rigid;
 pub use solid::Solid;
 pub use triangles::Triangles;
+pub use unit::{LengthUnit, UnitError};
 pub use voxel::{VoxelError, coarsen, point_spacing, spacing_of, thin_to, voxel_downsample};

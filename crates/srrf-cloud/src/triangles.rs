@@ -38,7 +38,13 @@ impl Triangles {
 
     /// A point drawn uniformly by area; the origin if there is no triangle.
     pub fn sample(&self, rng: &mut impl Rng) -> Vector3<f64> {
-        let at = rng.random::<f64>() * self.area();
+        let at = rng.random();
+        self.sample_at(at, rng)
+    }
+
+    /// A point drawn from the triangle at the share `at` (from 0 to 1) of the running area; the origin if there is no triangle.
+    pub(crate) fn sample_at(&self, at: f64, rng: &mut impl Rng) -> Vector3<f64> {
+        let at = at * self.area();
         let index = self.running_area.partition_point(|&area| area <= at).min(self.corners.len().max(1) - 1);
         let Some([a, b, c]) = self.corners.get(index) else { return Vector3::zeros() };
         let (mut u, mut v): (f64, f64) = (rng.random(), rng.random());
