@@ -95,6 +95,14 @@ async function turns(page) {
 
 const { page, complaints } = await open();
 await shot(page, 'top');
+const opening = await page.$eval('main > section', (e) => e.id);
+assert.notEqual(opening, 'losses', 'the report opens with results');
+const misplaced = await page.$$eval('.sheet table', (tables) => tables.flatMap((table) =>
+  [...table.tHead.rows[0].cells].filter((head, i) => {
+    const cell = table.tBodies[0].rows[0]?.cells[i];
+    return cell && getComputedStyle(cell).textAlign === 'right' && getComputedStyle(head.firstElementChild).textAlign !== 'right';
+  }).map((head) => head.textContent)));
+assert.deepEqual(misplaced, [], 'heads of numbers stand over their numbers');
 await sorts(page);
 await turns(page);
 for (const id of ['losses', 'severity', 'pictures', 'table4', 'ablations']) {

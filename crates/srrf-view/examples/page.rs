@@ -14,7 +14,7 @@ use rand::rngs::ChaCha8Rng;
 use srrf_cloud::{EulerXyz, KnnIndex, PointCloud, Rigid, Skeleton, SoftMatch, farthest_point_sampling};
 use srrf_corrupt::datasets::ShapeSource;
 use srrf_corrupt::shapes::ProceduralShapes;
-use srrf_view::{Number, Page, Pair, Pose};
+use srrf_view::{Number, Page, Pair, PointValues, Pose, Tone};
 
 const USAGE: &str = "usage: page OUT.html [--points N] [--pairs N] [--offset X,Y,Z]";
 
@@ -50,8 +50,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         clouds.push((source, PointCloud::new(kept)?.transformed(&truth)));
     }
     let mut page = Page::new(format!("Registration of generated shapes, {points} points"));
-    for (index, (source, target)) in clouds.iter().enumerate() {
-        page = page.pair(pair(&shapes.id(index), source, target, &truth)?);
+    let painted: Vec<_> = clouds.iter().map(|(source, _)| paint(source)).collect();
+    for (index, ((source, target), (colours, intensities))) in clouds.iter().zip(&painted).enumerate() {
+        let values = PointValues { colours: Some(colours), intensities: Some(intensities) };
+        let pair = pair(&shapes.id(index), source, target, &truth)?;
+        page = page.pair(pair.values(values, PointValues::default()));
     }
     Ok(page.write(&out)?)
 }
@@ -84,10 +87,24 @@ fn pair<'a>(
         .pose(pose("upside down", flipped))
         .skeletons(skeletons.0, skeletons.1)
         .matches(matches)
-        .number(Number::text("Verdict", "right").help("the pose is the one that the pair was made with"))
+        .number(
+            Number::text("Verdict", "right")
+                .tone(Tone::Good)
+                .help("the pose is the one that the pair was made with"),
+        )
+        .number(Number::text(
+            "Refinement",
+            "the best start was kept, since the clouds look deformed in its pose",
+        ))
         .number(Number::new("Points, source", source.len() as f64))
         .number(Number::new("Points, target", target.len() as f64))
         .warning("This pair is generated, and its poses are made rather than found."))
+}
+
+/// Colours by place, and intensities by height.
+fn paint(cloud: &PointCloud) -> (Vec<[u8; 3]>, Vec<f64>) {
+    let byte = |x: f64| (127.5 * (1.0 + x.clamp(-1.0, 1.0))) as u8;
+    (cloud.points().iter().map(|p| p.map(byte)).collect(), cloud.points().iter().map(|p| p[2]).collect())
 }
 
 /// A few points, each drawn into the middle of its neighbourhood.

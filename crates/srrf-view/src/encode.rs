@@ -4,22 +4,26 @@
 //! box, and each cloud comes relative to the centre of its own box, so that survey coordinates lose
 //! nothing on their way to the graphics card's single precision.
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use nalgebra::Vector3;
 use srrf_cloud::{PairFrame, PointCloud, Rigid, Skeleton, SoftMatch};
 
 use crate::describe::describe;
 use crate::encoded::{EncodedCloud, EncodedMatch, EncodedPair, EncodedPose, EncodedSkeleton};
-use crate::quantise::{quantise_points, quantise_values};
+use crate::quantise::{quantise_bytes, quantise_points, quantise_values};
 use crate::residual::{Distances, Residuals};
 use crate::sample::even_indices;
-use crate::{MATCHES_PER_PAIR, PAGE_BYTES, POINTS_PER_CLOUD, Pair, Pose, Up};
+use crate::{MATCHES_PER_PAIR, PAGE_BYTES, POINTS_PER_CLOUD, Pair, PointValues, Pose, Up};
 
 /// Encodes one of the `pairs` pairs of a page.
 pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
     let mut warnings = pair.warnings.clone();
+    let clouds = [("source", pair.source), ("target", pair.target)];
+    let values = [0, 1].map(|i| fitting(clouds[i], pair.values[i], &mut warnings));
     let (source_budget, target_budget) = budgets(pairs, pair.poses.len() + 1);
-    let (source, drawn) = encode_cloud(pair.source, source_budget);
-    let (target, _) = encode_cloud(pair.target, target_budget);
+    let (source, drawn) = encode_cloud(pair.source, values[0], source_budget);
+    let (target, _) = encode_cloud(pair.target, values[1], target_budget);
     let distances = Distances::new(pair.target).ok();
     let source_centre = source.points.centre;
     let frame = PairFrame::about(source_centre.into(), target.points.centre.into());
@@ -59,10 +63,7 @@ pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
     let mut encoded = EncodedPair {
         name: pair.name.clone(),
         unit: pair.unit.clone(),
-        up: match pair.up {
-            Up::Z => "z",
-            Up::Y => "y",
-        },
+        up: pair.up.unwrap_or_else(|| Up::guess(pair.target)).name(),
         before: encode_pose(&before),
         poses,
         skeletons,
@@ -82,17 +83,44 @@ pub(crate) fn encode(pair: &Pair<'_>, pairs: usize) -> EncodedPair {
 /// Most points of the source and of the target in a page with so many pairs and poses a pair.
 ///
 /// Half of a pair's share of [`PAGE_BYTES`] goes to each cloud: 6 bytes a point, and in the source
-/// 2 more for each pose's distance.
+/// 2 more for each pose's distance. Colours and intensities are on top of it, 4 bytes a point at most.
 fn budgets(pairs: usize, poses: usize) -> (usize, usize) {
     let half = PAGE_BYTES / pairs.max(1) / 2;
     ((half / (6 + 2 * poses)).min(POINTS_PER_CLOUD), (half / 6).min(POINTS_PER_CLOUD))
 }
 
-fn encode_cloud(cloud: &PointCloud, budget: usize) -> (EncodedCloud, Vec<[f64; 3]>) {
-    let drawn: Vec<[f64; 3]> =
-        even_indices(cloud.len(), budget).into_iter().map(|i| cloud.points()[i]).collect();
+fn encode_cloud(cloud: &PointCloud, values: PointValues<'_>, budget: usize) -> (EncodedCloud, Vec<[f64; 3]>) {
+    let indices = even_indices(cloud.len(), budget);
+    let drawn: Vec<[f64; 3]> = indices.iter().map(|&i| cloud.points()[i]).collect();
     let points = quantise_points(drawn.iter().copied());
-    (EncodedCloud { count: cloud.len(), shown: drawn.len(), points }, drawn)
+    let colours = values.colours.map(|all| {
+        let bytes: Vec<u8> = indices.iter().flat_map(|&i| all[i]).collect();
+        STANDARD.encode(bytes)
+    });
+    let intensities = values.intensities.map(|all| {
+        let some: Vec<f64> = indices.iter().map(|&i| all[i]).collect();
+        STANDARD.encode(quantise_bytes(&some))
+    });
+    (EncodedCloud { count: cloud.len(), shown: drawn.len(), points, colours, intensities }, drawn)
+}
+
+/// The values of a cloud that are one for each point.
+fn fitting<'a>(
+    (which, cloud): (&str, &PointCloud),
+    values: PointValues<'a>,
+    warnings: &mut Vec<String>,
+) -> PointValues<'a> {
+    let mut fits = |name: &str, have: usize| {
+        let fits = have == cloud.len();
+        if !fits {
+            let points = cloud.len();
+            warnings.push(format!("The {which} has {have} {name} for {points} points; they are left out."));
+        }
+        fits
+    };
+    let colours = values.colours.filter(|all| fits("colours", all.len()));
+    let intensities = values.intensities.filter(|all| fits("intensities", all.len()));
+    PointValues { colours, intensities }
 }
 
 /// The pose as 3 rows of 4.

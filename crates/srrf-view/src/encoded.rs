@@ -32,6 +32,12 @@ pub(crate) struct EncodedCloud {
     pub shown: usize,
     #[serde(flatten)]
     pub points: QuantisedPoints,
+    /// Base64 of red, green and blue, a byte each, of the points shown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub colours: Option<String>,
+    /// Base64 of a byte for each point shown: 0 and 255 are the first and the last percent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intensities: Option<String>,
 }
 
 #[derive(Debug, Serialize)]

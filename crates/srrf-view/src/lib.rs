@@ -44,13 +44,17 @@ mod pair;
 mod quantise;
 mod residual;
 mod sample;
+mod still;
+mod up;
 
 pub use bundle::viewer_script;
 pub use html::viewer_element;
-pub use number::Number;
+pub use number::{Number, Tone};
 pub use page::{Page, ViewError};
-pub use pair::{Pair, Pose, Up};
+pub use pair::{Pair, PointValues, Pose};
 pub use srrf_cloud::{Skeleton, SoftMatch};
+pub use still::to_png;
+pub use up::Up;
 
 /// Most points of one cloud that a page draws. Phones turn two clouds of this size smoothly, and a
 /// page of one pair stays under 4 MB.

@@ -2,6 +2,16 @@
 
 use serde::Serialize;
 
+/// What a figure speaks for; it is coloured, and marked with a sign for those who see no colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Tone {
+    /// All is well.
+    Good,
+    /// Something is wrong, or may well be.
+    Bad,
+}
+
 /// A figure shown beside the view, or in the row of a pose.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Number {
@@ -11,6 +21,8 @@ pub struct Number {
     pub(crate) unit: String,
     #[serde(skip_serializing_if = "String::is_empty")]
     pub(crate) help: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) tone: Option<Tone>,
 }
 
 impl Number {
@@ -21,7 +33,13 @@ impl Number {
 
     /// A figure that is shown as it is written, such as `"right (97 %)"` or `"4,231 of 35,000"`.
     pub fn text(label: impl Into<String>, value: impl Into<String>) -> Self {
-        Self { label: label.into(), value: value.into(), unit: String::new(), help: String::new() }
+        Self {
+            label: label.into(),
+            value: value.into(),
+            unit: String::new(),
+            help: String::new(),
+            tone: None,
+        }
     }
 
     /// Names the unit, such as `m` or `°`.
@@ -35,6 +53,13 @@ impl Number {
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = help.into();
+        self
+    }
+
+    /// Says what the figure speaks for.
+    #[must_use]
+    pub fn tone(mut self, tone: Tone) -> Self {
+        self.tone = Some(tone);
         self
     }
 

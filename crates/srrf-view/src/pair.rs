@@ -2,7 +2,7 @@
 
 use srrf_cloud::{PointCloud, Registration, Rigid, Skeleton, SoftMatch};
 
-use crate::Number;
+use crate::{Number, Up};
 
 /// A pose to show, with its name and figures of its own.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,16 +27,6 @@ impl Pose {
     }
 }
 
-/// Which axis points up on the screen at first. The reader can change it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Up {
-    /// As scanners and surveys have it.
-    #[default]
-    Z,
-    /// As most meshes have it, ModelNet40's HDF5 files among them.
-    Y,
-}
-
 /// Two clouds, the poses found between them, and whatever else is worth seeing.
 #[derive(Debug, Clone)]
 pub struct Pair<'a> {
@@ -50,7 +40,18 @@ pub struct Pair<'a> {
     pub(crate) numbers: Vec<Number>,
     pub(crate) warnings: Vec<String>,
     pub(crate) unit: String,
-    pub(crate) up: Up,
+    pub(crate) up: Option<Up>,
+    /// Of the source and of the target.
+    pub(crate) values: [PointValues<'a>; 2],
+}
+
+/// What a cloud holds for each of its points besides the place.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PointValues<'a> {
+    /// Red, green, blue.
+    pub colours: Option<&'a [[u8; 3]]>,
+    /// Intensity of the return, in any unit.
+    pub intensities: Option<&'a [f64]>,
 }
 
 impl<'a> Pair<'a> {
@@ -67,7 +68,8 @@ impl<'a> Pair<'a> {
             numbers: Vec::new(),
             warnings: Vec::new(),
             unit: String::new(),
-            up: Up::default(),
+            up: None,
+            values: [PointValues::default(); 2],
         }
     }
 
@@ -139,10 +141,18 @@ impl<'a> Pair<'a> {
         self
     }
 
-    /// Which axis points up on the screen.
+    /// Colours and intensities of the source and of the target, one for each point. The reader switches between them and one
+    /// colour a cloud.
+    #[must_use]
+    pub fn values(mut self, source: PointValues<'a>, target: PointValues<'a>) -> Self {
+        self.values = [source, target];
+        self
+    }
+
+    /// Which axis of the target points up on the screen; without it, [`Up::guess`] says.
     #[must_use]
     pub fn up(mut self, up: Up) -> Self {
-        self.up = up;
+        self.up = Some(up);
         self
     }
 }

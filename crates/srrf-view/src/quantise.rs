@@ -58,6 +58,19 @@ pub(crate) fn quantise_values(values: &[f64]) -> QuantisedValues {
     QuantisedValues { max, data: STANDARD.encode(bytes) }
 }
 
+/// Any numbers as bytes: 0 up to the smallest percent of them, 255 from the largest percent on. NaN counts as the smallest.
+pub(crate) fn quantise_bytes(values: &[f64]) -> Vec<u8> {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| sorted.get((sorted.len().saturating_sub(1) as f64 * share).round() as usize);
+    let (Some(&low), Some(&high)) = (at(0.01), at(0.99)) else { return vec![0; values.len()] };
+    // A cast saturates, and takes NaN for 0. Halved, since a difference may be beyond f64.
+    let width = high / 2.0 - low / 2.0;
+    let byte =
+        |v: &f64| if width > 0.0 { ((v / 2.0 - low / 2.0) / width * 255.0).round() as u8 } else { 128 };
+    values.iter().map(byte).collect()
+}
+
 fn step(value: f64, extent: f64) -> u16 {
     // A cast saturates.
     if extent > 0.0 { (value / extent * STEPS).round() as u16 } else { 0 }
@@ -91,6 +104,16 @@ mod tests {
         }
         assert_eq!(packed.extent[2], 0.0);
         assert_eq!(packed.centre[2], 120.0);
+    }
+
+    #[test]
+    fn intensities_fill_their_range() {
+        let values: Vec<f64> = (0..=1000).map(f64::from).chain([1e9, f64::NAN, f64::INFINITY]).collect();
+        let bytes = quantise_bytes(&values);
+        assert_eq!((bytes[0], bytes[500], bytes[1000]), (0, 127, 255));
+        assert_eq!(bytes[1001..], [255, 0, 255]);
+        assert_eq!(quantise_bytes(&[7.0; 3]), [128; 3]);
+        assert_eq!(quantise_bytes(&[f64::NAN]), [0]);
     }
 
     #[test]

@@ -82,10 +82,11 @@ impl Section {
 impl Document {
     /// As Markdown; pictures are links to their files.
     pub fn markdown(&self) -> String {
-        let mut text = format!("# {}\n\n{}", self.title, self.fact_lines());
+        let mut text = format!("# {}\n", self.title);
         for section in self.sections.iter().filter(|section| section.is_text()) {
             text += &format!("\n## {}\n\n{}", section.title, section.markdown_body());
         }
+        text += &format!("\n## Where the numbers come from\n\n{}", self.fact_lines());
         text
     }
 

@@ -9,6 +9,9 @@ use super::sheet::escape;
 const POLICY: &str =
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:";
 
+/// Heading of the facts.
+const ORIGIN: &str = "Where the numbers come from";
+
 /// The page. The viewer's script is in it only where a section has a view.
 pub(crate) fn html(document: &Document) -> String {
     let title = escape(&document.title);
@@ -30,8 +33,8 @@ pub(crate) fn html(document: &Document) -> String {
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
          <link rel=\"icon\" href=\"data:,\">\n<title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n\
-         <header><h1>{title}</h1><dl>{facts}</dl></header>\n<nav aria-label=\"Sections\">{links}</nav>\n\
-         <main>{sections}</main>\n<script>{script}</script>\n<script>{viewer}</script>\n</body>\n</html>\n",
+         <header><h1>{title}</h1></header>\n<nav aria-label=\"Sections\">{links}<a href=\"#origin\">{ORIGIN}</a></nav>\n\
+         <main>{sections}<section id=\"origin\"><h2>{ORIGIN}</h2><dl>{facts}</dl></section></main>\n<script>{script}</script>\n<script>{viewer}</script>\n</body>\n</html>\n",
         style = include_str!("../../web/report.css"),
         script = include_str!("../../web/report.js"),
     )
@@ -87,6 +90,8 @@ mod tests {
             assert!(!page.contains(address), "{address}");
         }
         assert!(!page.contains("three.js"), "no view, no viewer");
+        let place = |what: &str| page.find(what).unwrap();
+        assert!(place("<table>") < place("<dl>"), "results come first, where they come from last");
         let text = document.markdown();
         assert!(text.starts_with("# ") && text.contains("](a.svg)") && text.contains("\n- "), "{text}");
     }

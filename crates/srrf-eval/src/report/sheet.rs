@@ -141,6 +141,12 @@ impl Sheet {
         text
     }
 
+    /// Whether a column holds numbers: some, and no words.
+    fn is_numeric(&self, column: usize) -> bool {
+        let cells = || self.rows.iter().filter_map(|row| row.get(column));
+        cells().any(|cell| cell.value().is_some()) && !cells().any(|cell| matches!(cell, Cell::Text(_)))
+    }
+
     /// As HTML; the page's script makes the headings sort the rows.
     pub fn html(&self) -> String {
         let mut html =
@@ -149,8 +155,10 @@ impl Sheet {
             html += &format!("<p>{}</p>", escape(&self.note));
         }
         html += "<div class=\"scroll\"><table><thead><tr>";
-        for head in &self.head {
-            html += &format!("<th scope=\"col\"><button type=\"button\">{}</button></th>", escape(head));
+        for (column, head) in self.head.iter().enumerate() {
+            let class = if self.is_numeric(column) { " class=\"number\"" } else { "" };
+            html +=
+                &format!("<th scope=\"col\"{class}><button type=\"button\">{}</button></th>", escape(head));
         }
         html += "</tr></thead><tbody>\n";
         for row in &self.rows {
@@ -234,5 +242,7 @@ mod tests {
         let html = sheet().html();
         assert!(html.contains("A &lt;title&gt;") && html.contains("data-v=\"2.001\"><b>2.00</b>"), "{html}");
         assert_eq!(html.matches("<tr>").count(), 6);
+        let heads: Vec<&str> = html.matches("<th scope=\"col\" class=\"number\">").collect();
+        assert_eq!(heads.len(), 2, "the heads of numbers, not that of the names: {html}");
     }
 }

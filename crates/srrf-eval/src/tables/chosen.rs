@@ -1,7 +1,7 @@
 //! The pairs that the page shows in 3D.
 
 use srrf_cloud::Register;
-use srrf_view::{Number, Pair as ViewPair, Pose, Up, viewer_element};
+use srrf_view::{Number, Pair as ViewPair, Pose, viewer_element};
 
 use crate::EvalError;
 use crate::answers::{PairRecord, RunOutcome};
@@ -54,7 +54,7 @@ fn view<'a>(
 ) -> ViewPair<'a> {
     let group = outcome.groups[record.group].name();
     let name = format!("{group}, {}{why}", record.id);
-    let mut shown = ViewPair::new(name, &made.pair.source, &made.pair.target).up(Up::Y);
+    let mut shown = ViewPair::new(name, &made.pair.source, &made.pair.target);
     // The first pose is shown first: the network's.
     let (ours, others): (Vec<usize>, Vec<usize>) =
         (0..outcome.rows.len()).partition(|&row| outcome.rows[row] == BY);

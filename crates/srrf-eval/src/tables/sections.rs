@@ -36,11 +36,9 @@ pub(super) fn document(
     let mut sections = Vec::new();
     let same = evidence.same_shapes(options);
     if let Some(main) = evidence.parts.get("main") {
-        sections.push(losses_section(main));
         sections.push(main_section(main));
-    }
-    if let Some(main) = evidence.parts.get("main") {
         sections.push(probability_section(main));
+        sections.push(losses_section(main));
     }
     if let Some(same) = same {
         sections.push(severity_section(same)?);
@@ -90,13 +88,26 @@ fn facts(options: &TablesOptions, evidence: &TablesEvidence) -> Vec<(String, Str
     for (name, reason) in evidence.methods.left_out.iter().chain(&evidence.missing) {
         fact(&format!("Left out: {name}"), reason.clone());
     }
-    // The places of the program and of the data are no part of the command.
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    // The places of the program, of the data and of the report are no part of the command.
+    let arguments: Vec<String> = std::env::args().skip(1).map(|argument| without_folder(&argument)).collect();
     fact("Command", without_place(options.data.as_deref(), &format!("srrf-eval {}", arguments.join(" "))));
     fact("Program", format!("srrf-eval {}, device {}", env!("CARGO_PKG_VERSION"), options.device));
     fact("Machine", crate::report::machine());
     fact("Time of all answers", format!("{:.0} s on one thread each", seconds(evidence)));
     facts
+}
+
+/// An argument; of an absolute path, also behind a `=`, its last part alone.
+fn without_folder(argument: &str) -> String {
+    let (flag, value) = match argument.split_once('=') {
+        Some((flag, value)) if flag.starts_with('-') => (format!("{flag}="), value),
+        _ => (String::new(), argument),
+    };
+    let path = Path::new(value);
+    match path.file_name() {
+        Some(name) if path.is_absolute() => format!("{flag}{}", name.to_string_lossy()),
+        _ => argument.to_owned(),
+    }
 }
 
 /// `text`, with `PATH` where it names the place of the data: pages are read elsewhere.

@@ -109,3 +109,26 @@ fn says_in_words_what_the_picture_shows() {
     assert!(text.contains("“icp” turns the source by 0 degrees and moves its centre by 0.5 mm"), "{text}");
     assert!(text.ends_with("nine in ten within 0.5 mm."), "{text}");
 }
+
+#[test]
+fn colours_and_intensities_go_with_their_points() {
+    let (source, target) = clouds(5);
+    let colours: Vec<[u8; 3]> = (0..5).map(|i| [i, 10 * i, 255 - i]).collect();
+    let intensities = [0.0, 1.0, 2.0, 3.0, 4.0];
+    let values = PointValues { colours: Some(&colours), intensities: Some(&intensities) };
+    let short = PointValues { colours: Some(&colours[1..]), intensities: None };
+    let encoded = encode(&Pair::new("p", &source, &target).values(values, short), 1);
+    let bytes = |text: &Option<String>| STANDARD.decode(text.as_ref().unwrap()).unwrap();
+    assert_eq!(bytes(&encoded.source.colours), colours.concat());
+    assert_eq!(bytes(&encoded.source.intensities), [0, 64, 128, 191, 255]);
+    assert_eq!(encoded.target.colours, None);
+    assert_eq!(encoded.warnings, ["The target has 4 colours for 5 points; they are left out."]);
+}
+
+#[test]
+fn up_is_as_given_or_guessed() {
+    let (source, target) = clouds(300);
+    let up = |pair: Pair<'_>| encode(&pair, 1).up;
+    assert_eq!(up(Pair::new("p", &source, &target).up(Up::MinusY)), "-y");
+    assert_eq!(up(Pair::new("p", &source, &target)), Up::guess(&target).name());
+}

@@ -98,10 +98,51 @@ async function pinAndTurn(page) {
 const noSideways = (page) =>
   page.evaluate(() => document.documentElement.scrollWidth <= document.documentElement.clientWidth);
 
+/** Each cloud is on the picture, to its last point. */
+const wholeClouds = (page) =>
+  page.$eval('.srrf-view', (view) => {
+    const { scene } = view.srrfView;
+    const shown = [[scene.positions.target, scene.target], [scene.positions.source, scene.source]];
+    return shown.map(([position, cloud]) => {
+      cloud.updateWorldMatrix(true, false);
+      const point = scene.camera.position.clone();
+      let outermost = 0;
+      for (let i = 0; i < position.length; i += 3) {
+        point.fromArray(position, i).applyMatrix4(cloud.matrixWorld).project(scene.camera);
+        outermost = Math.max(outermost, Math.abs(point.x), Math.abs(point.y));
+      }
+      return outermost;
+    });
+  });
+
+/** What is written beside the picture is whole: words in one piece, tables not cut. */
+async function wellSet(page) {
+  const broken = await page.$$eval('.sv-facts dt, .sv-facts dd, .sv-side th', (all) => all.filter((e) => {
+    const range = document.createRange();
+    for (const node of [...e.childNodes].filter((n) => n.nodeType === 3)) {
+      for (const { index, 0: word } of node.textContent.matchAll(/\S+/g)) {
+        range.setStart(node, index);
+        range.setEnd(node, index + word.length);
+        if (new Set([...range.getClientRects()].map((r) => Math.round(r.top))).size > 1) return true;
+      }
+    }
+    return false;
+  }).map((e) => e.textContent));
+  assert.deepEqual(broken, [], 'words are broken');
+  const cut = await page.$$eval('.sv-scroll', (all) => all.filter((e) => e.scrollWidth > e.clientWidth + 1).length);
+  assert.equal(cut, 0, 'a table is cut at the right');
+}
+
 async function everythingOnOnePage(browser) {
   const { page, complaints } = await open(browser, 'one.html');
   await firstFrame(page);
   await shot(page, '1-opens');
+  for (const outermost of await wholeClouds(page)) {
+    assert.ok(outermost < 1 && outermost > 0.3, `the first view reaches to ${outermost}`);
+  }
+  await wellSet(page);
+  const tone = await page.$eval('.sv-facts .sv-good', (e) => getComputedStyle(e).color);
+  assert.equal(tone, 'rgb(10, 107, 71)', 'the verdict has its colour');
   await changes(page, 'nothing', async () => {}, false);
   await changes(page, 'a drag', () => drag(page));
   await changes(page, 'the wheel', () => page.mouse.wheel({ deltaY: -300 }));
@@ -131,6 +172,10 @@ async function everythingOnOnePage(browser) {
   await changes(page, 'the range of the colours', () => setRange(page, '.sv-side fieldset input[step="0.005"]', 0.2));
   await page.select('.sv-bar select', '1');
   await shot(page, '4-distance');
+  await changes(page, 'the colours of the points', () => page.click('input[value=colours]'));
+  await shot(page, '4-colours');
+  await changes(page, 'intensity', () => page.click('input[value=intensities]'));
+  await page.click('input[value=residual]');
   await changes(page, 'the size of the points', () => setRange(page, '.sv-side input[max="10"]', 9));
   await setRange(page, '.sv-side input[max="10"]', 4);
   await page.click('input[value=cloud]');
@@ -160,6 +205,7 @@ async function onAPhone(browser) {
     const { page, complaints } = await open(browser, 'one.html', { width, height: 740, touch: true });
     await firstFrame(page);
     assert.ok(await noSideways(page), `the page is wider than ${width} pixels`);
+    await wellSet(page);
     await changes(page, 'a finger', () => pinAndTurn(page));
     await shot(page, `8-phone-${width}`);
     await shot(page, `8-phone-${width}-whole`, { fullPage: true });

@@ -37,6 +37,19 @@ export const SCHEMES = {
   },
 };
 
+/** Viridis at places from 0 to 255, three bytes each, for intensities. */
+export function viridis(places) {
+  const table = Array.from({ length: 256 }, (_, i) => {
+    const place = (i / 255) * (VIRIDIS.length - 1);
+    const low = Math.min(Math.floor(place), VIRIDIS.length - 2);
+    const [a, b] = [rgb(VIRIDIS[low]), rgb(VIRIDIS[low + 1])];
+    return a.map((v, c) => Math.round(255 * (v + (b[c] - v) * (place - low))));
+  });
+  const bytes = new Uint8Array(3 * places.length);
+  places.forEach((place, i) => bytes.set(table[place], 3 * i));
+  return bytes;
+}
+
 export const css = (colour) => `rgb(${colour.map((v) => Math.round(255 * v)).join(' ')})`;
 
 export const mix = (a, b, share) => a.map((v, c) => v + (b[c] - v) * share);

@@ -18,6 +18,12 @@ export function decodePoints({ extent, data }) {
   return out;
 }
 
+/** Bytes as they are. */
+export function decodeBytes(base64) {
+  const text = atob(base64);
+  return Uint8Array.from(text, (letter) => letter.charCodeAt(0));
+}
+
 /** Values from 0 to `max`. */
 export function decodeValues({ max, data }) {
   return Float32Array.from(words(data), (step) => (step / 65535) * max);

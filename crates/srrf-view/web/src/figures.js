@@ -7,9 +7,12 @@ export const isBeyond = (pair, x) => Boolean(pair.distance_limit) && x >= pair.d
 
 /** Labels and values; the help is shown under them, since touch screens have no tooltips. */
 export function facts(numbers) {
-  const rows = numbers.map(({ label, value, unit, help }) =>
-    make('div', {}, make('dt', {}, label), make('dd', {}, withUnit(value, unit)),
-      help ? make('dd', { className: 'sv-help' }, help) : null));
+  const rows = numbers.map(({ label, value, unit, help, tone }) => {
+    const sign = tone && make('span', { className: 'sv-sign', attributes: { 'aria-hidden': 'true' } }, tone === 'good' ? '✓' : '!');
+    return make('div', {}, make('dt', {}, label),
+      make('dd', { className: tone ? `sv-${tone}` : '' }, sign || null, withUnit(value, unit)),
+      help ? make('dd', { className: 'sv-help' }, help) : null);
+  });
   return make('dl', { className: 'sv-facts' }, ...rows);
 }
 

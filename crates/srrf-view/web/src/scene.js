@@ -10,17 +10,18 @@ import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { LineMaterial } from 'three/addons/lines/LineMaterial.js';
 import { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
 import { LineSegmentsGeometry } from 'three/addons/lines/LineSegmentsGeometry.js';
-import { mix } from './colours.js';
-import { decodePoints, decodeValues } from './decode.js';
+import { mix, viridis } from './colours.js';
+import { decodeBytes, decodePoints, decodeValues } from './decode.js';
 
 // Colours are given as they appear on the screen and pass through unchanged.
 ColorManagement.enabled = false;
 
 const VERTEX = `
 attribute float residual;
+attribute vec3 own;
 uniform float size, residualScale;
 uniform vec3 colour, ramp[9];
-uniform bool byResidual;
+uniform int mode;
 uniform vec2 haze;
 varying vec3 shade;
 varying float far;
@@ -30,7 +31,7 @@ void main() {
   gl_PointSize = size;
   float x = clamp(residual / residualScale, 0.0, 1.0) * 7.999;
   int i = int(x);
-  shade = byResidual ? mix(ramp[i], ramp[i + 1], x - float(i)) : colour;
+  shade = mode == 1 ? mix(ramp[i], ramp[i + 1], x - float(i)) : mode == 2 ? own : colour;
   far = clamp((-place.z - haze.x) / haze.y, 0.0, 1.0);
 }`;
 
@@ -52,22 +53,42 @@ function quantile(values, q) {
   return sorted[Math.min(sorted.length - 1, Math.floor(q * sorted.length))] ?? 0;
 }
 
-/** At most 3,000 of the points, spread over the list. */
-function some(position) {
+// Towards the faces, edges and corners of a cube, and between them.
+const DIRECTIONS = [];
+for (let x = -2; x <= 2; x++) {
+  for (let y = -2; y <= 2; y++) {
+    for (let z = -2; z <= 2; z++) if (Math.max(Math.abs(x), Math.abs(y), Math.abs(z)) === 2) DIRECTIONS.push([x, y, z]);
+  }
+}
+
+// Points farther out than this, in radii of nearly all of them, are strays.
+const STRAY = 3;
+
+/**
+ * The points that a picture of a cloud must hold, and a ball around them: the outermost point in each direction, and at
+ * most 3,000 spread over the list. A few strays do not make everything small: they are left out.
+ */
+function outline(position) {
   const step = 3 * Math.max(1, Math.floor(position.length / 9000));
   const points = [];
   for (let i = 0; i < position.length; i += step) points.push(new Vector3().fromArray(position, i));
-  return points;
-}
-
-/** Centre and radius of most of the points: a few strays do not make everything small. */
-function ball(points) {
   const middle = (axis) => {
     const values = points.map((p) => p[axis]);
     return (quantile(values, 0.02) + quantile(values, 0.98)) / 2;
   };
   const centre = new Vector3(middle('x'), middle('y'), middle('z'));
-  return { centre, radius: quantile(points.map((p) => p.distanceTo(centre)), 0.98) };
+  const reach = STRAY * quantile(points.map((p) => p.distanceTo(centre)), 0.98);
+  const near = points.filter((p) => p.distanceTo(centre) <= reach);
+  for (const [x, y, z] of DIRECTIONS) {
+    let [best, at] = [-Infinity, -1];
+    for (let i = 0; i < position.length; i += 3) {
+      const [a, b, c] = [position[i], position[i + 1], position[i + 2]];
+      const along = x * a + y * b + z * c;
+      if (along > best && Math.hypot(a - centre.x, b - centre.y, c - centre.z) <= reach) [best, at] = [along, i];
+    }
+    if (at >= 0) near.push(new Vector3().fromArray(position, at));
+  }
+  return { points: near, ball: { centre, radius: near.reduce((most, p) => Math.max(most, p.distanceTo(centre)), 0) } };
 }
 
 /** A ball that holds several balls. */
@@ -104,7 +125,7 @@ export class Scene {
 
   cloudMaterial() {
     const { size, residualScale, haze, background, ramp } = this;
-    const own = { colour: { value: [0, 0, 0] }, byResidual: { value: false } };
+    const own = { colour: { value: [0, 0, 0] }, mode: { value: 0 } };
     return new ShaderMaterial({
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
@@ -112,11 +133,13 @@ export class Scene {
     });
   }
 
-  cloud(position) {
+  cloud(position, values) {
     const geometry = new BufferGeometry();
     geometry.setAttribute('position', new BufferAttribute(position, 3));
     geometry.setAttribute('residual', new BufferAttribute(new Float32Array(position.length / 3), 1));
+    geometry.setAttribute('own', new BufferAttribute(new Uint8Array(position.length), 3, true));
     const cloud = new Points(geometry, this.cloudMaterial());
+    cloud.userData = values;
     cloud.matrixAutoUpdate = false;
     cloud.frustumCulled = false;
     return cloud;
@@ -131,12 +154,17 @@ export class Scene {
     }
     this.pair = pair;
     this.positions = { source: decodePoints(pair.source), target: decodePoints(pair.target) };
-    this.target = this.cloud(this.positions.target);
-    this.source = this.cloud(this.positions.source);
-    this.ghost = this.cloud(this.positions.source);
+    const values = ({ colours, intensities }) => ({
+      colours: colours && decodeBytes(colours),
+      intensities: intensities && viridis(decodeBytes(intensities)),
+    });
+    this.target = this.cloud(this.positions.target, values(pair.target));
+    this.source = this.cloud(this.positions.source, values(pair.source));
+    this.ghost = this.cloud(this.positions.source, {});
     this.ghost.matrix = matrixOf(pair.before.matrix);
-    this.samples = { source: some(this.positions.source), target: some(this.positions.target) };
-    this.balls = { source: ball(this.samples.source), target: ball(this.samples.target) };
+    const outlines = { source: outline(this.positions.source), target: outline(this.positions.target) };
+    this.samples = { source: outlines.source.points, target: outlines.target.points };
+    this.balls = { source: outlines.source.ball, target: outlines.target.ball };
     const found = matrixOf((pair.poses[0] ?? pair.before).matrix);
     this.radius = around([this.balls.target, this.moved(found)]).radius;
     this.skeletons = (pair.skeletons ?? []).map((skeleton) => this.skeleton(skeleton));
@@ -206,14 +234,21 @@ export class Scene {
     attribute.needsUpdate = true;
   }
 
-  paint(scheme, byResidual, residualScale) {
+  /** By `colouring`: 'cloud' (one colour each), 'residual', 'colours' or 'intensities' (where a cloud has them). */
+  paint(scheme, colouring, residualScale) {
+    const byResidual = colouring === 'residual';
     this.background.value = scheme.background;
     this.ramp.value = scheme.ramp.flat();
     this.residualScale.value = Math.max(residualScale, Number.MIN_VALUE);
     this.renderer.setClearColor(new Color(...scheme.background));
     const set = (cloud, colour, residual) => {
       cloud.material.uniforms.colour.value = colour;
-      cloud.material.uniforms.byResidual.value = residual;
+      const own = cloud.userData[colouring];
+      if (own) {
+        cloud.geometry.attributes.own.array.set(own);
+        cloud.geometry.attributes.own.needsUpdate = true;
+      }
+      cloud.material.uniforms.mode.value = residual ? 1 : own ? 2 : 0;
     };
     set(this.target, byResidual ? scheme.neutral : scheme.target, false);
     set(this.source, scheme.source, byResidual);
@@ -261,7 +296,7 @@ export class Scene {
     const up = back.clone().cross(right);
     const middle = (axis) => {
       const values = shown.map((p) => p.dot(axis));
-      return axis.clone().multiplyScalar((quantile(values, 0.005) + quantile(values, 0.995)) / 2);
+      return axis.clone().multiplyScalar((quantile(values, 0) + quantile(values, 1)) / 2);
     };
     const centre = middle(right).add(middle(up)).add(middle(back));
     const slope = Math.tan((this.camera.fov / 2) * (Math.PI / 180));
@@ -269,16 +304,19 @@ export class Scene {
       const d = p.sub(centre);
       return d.dot(back) + Math.max(Math.abs(d.dot(right)) / this.camera.aspect, Math.abs(d.dot(up))) / slope;
     });
-    const distance = 1.12 * Math.max(quantile(away, 0.99), 1e-6 * this.radius);
+    const distance = 1.12 * Math.max(quantile(away, 1), 1e-6 * this.radius);
     this.controls.target.copy(centre);
     this.camera.position.copy(centre).addScaledVector(back, distance);
     this.controls.update();
     this.invalidate();
   }
 
-  /** Turns the axes so that `up` ('y' or 'z') points up. */
+  /** Turns the axes so that `up` (such as 'z' or '-y') points up. */
   orient(up) {
-    this.axes.rotation.x = up === 'z' ? -Math.PI / 2 : 0;
+    const turns = {
+      x: [0, 0, 0.5], y: [0, 0, 0], z: [-0.5, 0, 0], '-x': [0, 0, -0.5], '-y': [1, 0, 0], '-z': [0.5, 0, 0],
+    };
+    this.axes.rotation.set(...turns[up].map((t) => t * Math.PI));
     this.invalidate();
   }
 

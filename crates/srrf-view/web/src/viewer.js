@@ -203,8 +203,13 @@ export class Viewer {
   }
 
   colourSection() {
-    const list = make('fieldset', {}, make('legend', {}, 'Colour of the source'));
-    for (const [value, text] of [['cloud', 'One colour for each cloud'], ['residual', 'Distance to the target']]) {
+    const list = make('fieldset', {}, make('legend', {}, 'Colours'));
+    const both = [this.pair.source, this.pair.target];
+    const ways = [['cloud', 'One colour for each cloud'], ['residual', 'Distance to the target']];
+    if (both.some((cloud) => cloud.colours)) ways.push(['colours', 'Colours of the points']);
+    if (both.some((cloud) => cloud.intensities)) ways.push(['intensities', 'Intensity, dark to bright']);
+    if (!ways.some(([value]) => value === this.state.colour)) this.state.colour = 'cloud';
+    for (const [value, text] of ways) {
       const change = () => {
         this.state.colour = value;
         this.refresh();
@@ -228,8 +233,9 @@ export class Viewer {
 
   viewSection() {
     const size = range(1, 10, 0.1, this.pointSize, (pixels) => this.scene.setPointSize(pixels));
-    const up = select(['Z', 'Y'], this.state.up === 'z' ? 0 : 1, (i) => {
-      this.state.up = 'zy'[i];
+    const axes = ['z', 'y', 'x', '-z', '-y', '-x'];
+    const up = select(axes.map((axis) => axis.toUpperCase().replace('-', '−')), axes.indexOf(this.state.up), (i) => {
+      this.state.up = axes[i];
       this.scene.orient(this.state.up);
       this.scene.fit();
     });
@@ -294,7 +300,7 @@ export class Viewer {
     this.scene.show(state.layers);
     this.scene.showResidual(this.end);
     this.scene.place(this.pose, state.t);
-    this.scene.paint(colours, residual, this.scale);
+    this.scene.paint(colours, state.colour, this.scale);
     for (const [key, swatch] of Object.entries(this.swatches)) {
       const own = key === 'matches' ? 'match' : key;
       const paint = key === 'skeletons' ? `linear-gradient(90deg, ${css(colours.source)} 50%, ${css(colours.target)} 50%)`
@@ -335,6 +341,8 @@ export class Viewer {
       if (summary) rows.push(make('p', { className: 'sv-muted' }, `median ${this.distance(summary.median)}, 90 % within ${this.distance(summary.p90)}`));
     }
     rows.push(make('p', { className: 'sv-entries' }, ...entries.map(entry)));
+    const own = { colours: 'Points in their own colours, where they have any', intensities: 'Points by intensity, where it is known' };
+    if (own[this.state.colour]) rows.push(make('p', { className: 'sv-muted' }, own[this.state.colour]));
     for (const [name, cloud] of [['source', this.pair.source], ['target', this.pair.target]]) {
       if (cloud.shown < cloud.count) {
         rows.push(make('p', { className: 'sv-muted' }, `Showing ${count(cloud.shown)} of ${count(cloud.count)} ${name} points`));
