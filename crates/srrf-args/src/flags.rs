@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 
 use crate::failure::Failure;
 use crate::numbers::whole;
+use crate::progress::{Progress, ProgressArgs};
 
 /// Most worker threads that can be asked for.
 pub const MOST_THREADS: usize = 4096;
@@ -118,6 +119,17 @@ pub struct Common {
     /// Whether to say nothing but errors.
     #[command(flatten)]
     pub quiet: Quiet,
+
+    /// How to show what is being done.
+    #[command(flatten)]
+    pub progress: ProgressArgs,
+}
+
+impl Common {
+    /// Signs of life, as asked for.
+    pub fn progress(&self) -> Progress {
+        self.progress.start(self.quiet.quiet)
+    }
 }
 
 /// `--quiet`

@@ -13,6 +13,7 @@ pub mod interrupt;
 pub mod numbers;
 mod output;
 mod program;
+mod progress;
 mod scripts;
 pub mod words;
 
@@ -20,4 +21,5 @@ pub use exit::{ABSTAINED, EXIT_CODES, FAILED, INTERRUPTED, USAGE};
 pub use failure::Failure;
 pub use output::Output;
 pub use program::{run_program, run_program_with};
+pub use progress::{Progress, ProgressArgs, ProgressKind};
 pub use scripts::Scripts;

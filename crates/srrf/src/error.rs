@@ -8,6 +8,7 @@ use srrf_model::{CopyError, DeviceError};
 use srrf_refine::RefineError;
 
 use crate::calibration::CalibrationError;
+use crate::scale::ScaleDoubt;
 use crate::warning::Warning;
 
 /// Why clouds could not be registered.
@@ -31,6 +32,9 @@ pub enum Error {
     /// The target cannot be used.
     #[error("target: {0}")]
     Target(#[source] CloudError),
+    /// The clouds seem to be in different units of length.
+    #[error("{0}")]
+    Scale(ScaleDoubt),
     /// No method found a pose.
     #[error("no pose found: {0}")]
     NoPose(#[source] NoPose),

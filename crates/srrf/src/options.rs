@@ -111,6 +111,9 @@ pub struct Options {
     pub device: String,
     /// Seed of the random samples of FPFH with RANSAC; nothing else draws. Default 0.
     pub seed: u64,
+    /// Whether clouds that seem to be in different units of length are an error. Default on; switch it off for clouds that are
+    /// known to share one.
+    pub check_scale: bool,
     /// The verdict is to abstain where the probability is below this. Default 0.5.
     pub abstain_below: Probability,
 }
@@ -128,6 +131,7 @@ impl Default for Options {
             weights: None,
             device: "flex".to_owned(),
             seed: 0,
+            check_scale: true,
             abstain_below: Probability::HALF,
         }
     }

@@ -11,6 +11,7 @@ use crate::features::Features;
 use crate::network::WeightsId;
 use crate::options::Method;
 use crate::probability::Probability;
+use crate::scale::AppliedScale;
 use crate::stage::StageTime;
 use crate::start::Start;
 use crate::warning::Warning;
@@ -41,6 +42,8 @@ pub struct TriedStart {
 pub struct Outcome {
     /// The pose, in input coordinates: `target ~ R source + t`.
     pub target_from_source: Rigid,
+    /// The factor by which the source was multiplied first, if there is one: `target ~ R (factor * source) + t`.
+    pub scale: Option<AppliedScale>,
     /// Calibrated probability that the pose is within 5 degrees and a tenth of the target's radius
     /// (root mean square) of the true one; see [`crate::Logistic`].
     pub probability: Probability,
@@ -89,6 +92,7 @@ impl Outcome {
             self.times.iter().map(|t| (t.stage.to_string(), json!(t.seconds))).collect();
         json!({
             "target_from_source": matrix(&self.target_from_source),
+            "scale": self.scale,
             "probability": self.probability,
             "abstain": self.abstain,
             "quaternion_wxyz": self.quaternion_wxyz(),

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use srrf_cloud::{PointCloud, Rigid, Solid};
 
+use crate::clock::StageClock;
 use crate::error::Error;
+use crate::event::Event;
 use crate::judge::{Judge, Judgement};
 use crate::network::Network;
 use crate::options::{Method, Options};
@@ -12,7 +14,7 @@ use crate::outcome::{Outcome, PointCounts};
 use crate::proposals::{Proposals, Round, rounds};
 use crate::request::{Request, RequestTarget};
 use crate::search::{Best, Search};
-use crate::stage::{Stage, StageClock, StageTime};
+use crate::stage::{Stage, StageTime};
 use crate::target::{PreparedPair, Target};
 use crate::warning::Warning;
 
@@ -65,38 +67,76 @@ impl Registrar {
     /// that is sure ends the search.
     ///
     /// # Errors
-    /// [`Error`] for clouds that determine no rotation, and where no pose is found.
+    /// [`Error`] for clouds that determine no rotation, for clouds that seem to be in different units of length
+    /// ([`Error::Scale`]), and where no pose is found.
     pub fn register(&self, request: &Request<'_>) -> Result<Outcome, Error> {
         let (pair, clock) = self.prepare_pair(request)?;
-        let mut search = Search::new(&pair, self.options.refine.is_some(), clock);
+        let tried = if self.options.check_scale { self.doubt_scale(request, &pair)? } else { None };
+        let mut outcome = self.rounds(request, &pair, clock, self.rounds.len())?;
+        if let Some(tried) = tried
+            && tried.is_told(outcome.abstain)
+        {
+            outcome.abstain |= tried.ambiguous;
+            outcome.warnings.push(Warning::Scale(tried.doubt));
+        }
+        Ok(outcome)
+    }
+
+    /// As [`register`](Self::register), without a question about the scale.
+    pub(crate) fn register_as_it_is(&self, request: &Request<'_>) -> Result<Outcome, Error> {
+        let (pair, clock) = self.prepare_pair(request)?;
+        self.rounds(request, &pair, clock, self.rounds.len())
+    }
+
+    /// What the first round finds.
+    pub(crate) fn first_round(&self, request: &Request<'_>) -> Result<Outcome, Error> {
+        let (pair, clock) = self.prepare_pair(request)?;
+        self.rounds(request, &pair, clock, 1)
+    }
+
+    /// At most so many rounds.
+    fn rounds(
+        &self,
+        request: &Request<'_>,
+        pair: &PreparedPair,
+        clock: StageClock<'_>,
+        most: usize,
+    ) -> Result<Outcome, Error> {
+        let mut search = Search::new(pair, self.options.refine.is_some(), clock);
         let mut answer = None;
-        for (round, sources) in &self.rounds {
+        for (number, (round, sources)) in (1..).zip(&self.rounds).take(most) {
             if request.is_stopped() {
                 return Err(Error::Stopped);
             }
+            request.observed.tell(Event::Round { number, of: self.rounds.len() });
             search.propose(sources).map_err(Error::Refine)?;
             let Some(best) = search.best(round.refining()).map_err(Error::Refine)? else { continue };
             let judgement = self.judge.judge(&best.features);
             answer = Some((best, judgement));
-            if judgement.is_sure() {
+            let (probability, sure) = (judgement.probability, judgement.is_sure());
+            request.observed.tell(Event::Judged { round: number, probability, sure });
+            if sure {
                 break;
             }
         }
         match answer {
-            Some((best, judgement)) => Ok(self.outcome(&pair, search, best, judgement)),
+            Some((best, judgement)) => Ok(self.outcome(pair, search, best, judgement)),
             None => Err(Error::NoPose(search.no_pose())),
         }
     }
 
     /// Checks, centres, thins and indexes both clouds; the target only if it is not ready yet.
-    fn prepare_pair(&self, request: &Request<'_>) -> Result<(PreparedPair, StageClock), Error> {
+    fn prepare_pair<'a>(&self, request: &Request<'a>) -> Result<(PreparedPair, StageClock<'a>), Error> {
         Solid::new(request.source).map_err(Error::Source)?;
+        request.observed.tell(Event::Began(Stage::PrepareTarget));
         let target = match request.target {
             RequestTarget::Cloud(cloud) => self.prepare(cloud)?,
             RequestTarget::Prepared(target) => target.clone(),
         };
         let prepared = StageTime { stage: Stage::PrepareTarget, seconds: target.0.seconds };
-        let mut clock = StageClock::after(vec![prepared]);
+        request.observed.tell(Event::Ended(prepared));
+        let mut clock = StageClock::after(vec![prepared], request.observed);
+        clock.begin(Stage::PrepareSource);
         let initial = request.initial.unwrap_or_else(Rigid::identity);
         let pair = PreparedPair::new(request.source, target, &initial, &self.options)?;
         clock.lap(Stage::PrepareSource);
@@ -109,6 +149,7 @@ impl Registrar {
         learned.warnings.extend(abstain.then_some(Warning::Doubtful { probability }));
         Outcome {
             target_from_source: pair.frame.undo_pose(&best.pose),
+            scale: None,
             probability,
             abstain,
             method: self.options.method,

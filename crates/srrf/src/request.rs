@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use srrf_cloud::{PointCloud, Rigid};
 
+use crate::event::{Observed, Observer};
 use crate::target::Target;
 
 /// What is to be registered: a source, the target that it is laid on, and a first guess if there is one.
@@ -17,6 +18,8 @@ pub struct Request<'a> {
     pub initial: Option<Rigid>,
     /// A flag that ends the search with [`crate::Error::Stopped`] where another thread sets it; looked at between rounds.
     pub stop: Option<&'a AtomicBool>,
+    /// Who is told what is done, while it is done.
+    pub observed: Observed<'a>,
 }
 
 /// A target as it is, or one that [`crate::Registrar::prepare`] made ready.
@@ -31,7 +34,7 @@ pub enum RequestTarget<'a> {
 impl<'a> Request<'a> {
     /// Without a first guess. `target` is a cloud or a prepared [`Target`].
     pub fn new(source: &'a PointCloud, target: impl Into<RequestTarget<'a>>) -> Self {
-        Self { source, target: target.into(), initial: None, stop: None }
+        Self { source, target: target.into(), initial: None, stop: None, observed: Observed::default() }
     }
 
     /// With a first guess.
@@ -47,6 +50,30 @@ impl<'a> Request<'a> {
     /// Whether the search is to end.
     pub(crate) fn is_stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed))
+    }
+
+    /// With an observer of the stages.
+    ///
+    /// ```
+    /// # use rand::{SeedableRng, rngs::ChaCha8Rng};
+    /// # use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
+    /// use std::sync::Mutex;
+    /// use srrf::{Event, Method, Options, Registrar, Request};
+    /// # let cloud = ProceduralShapes::new(7, 3, None)?.sample(1, 1500, &mut ChaCha8Rng::seed_from_u64(1))?;
+    ///
+    /// let stages = Mutex::new(Vec::new());
+    /// let watch = |event: Event| {
+    ///     if let (Event::Began(stage), Ok(mut stages)) = (event, stages.lock()) {
+    ///         stages.push(stage.to_string());
+    ///     }
+    /// };
+    /// let registrar = Registrar::new(Options { method: Method::Given, ..Options::default() })?;
+    /// registrar.register(&Request::new(&cloud, &cloud).observed_by(&watch))?;
+    /// assert_eq!(stages.into_inner()?, ["prepare target", "prepare source", "refine"]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn observed_by(self, observer: &'a dyn Observer) -> Self {
+        Self { observed: Observed::by(observer), ..self }
     }
 }
 

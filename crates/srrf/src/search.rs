@@ -3,12 +3,13 @@
 use srrf_cloud::Rigid;
 use srrf_refine::{Evidence, RefineError, RefineTarget, Refinement, StartSupport, Verdict};
 
+use crate::clock::StageClock;
 use crate::coarse::CoarsePose;
 use crate::error::NoPose;
 use crate::features::Features;
 use crate::outcome::TriedStart;
 use crate::proposals::{Proposal, Proposals, Proposed};
-use crate::stage::{Stage, StageClock, StageTime};
+use crate::stage::{Stage, StageTime};
 use crate::start::Start;
 use crate::target::PreparedPair;
 use crate::warning::Warning;
@@ -38,7 +39,7 @@ pub(crate) struct Learned {
 pub(crate) struct Search<'a> {
     pair: &'a PreparedPair,
     refine: bool,
-    clock: StageClock,
+    clock: StageClock<'a>,
     starts: Vec<Start>,
     /// One for each of `starts`.
     supports: Vec<StartSupport>,
@@ -52,7 +53,7 @@ pub(crate) struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// Without starts. Where `refine` is false they are compared as they are. `clock` goes on with its times.
-    pub fn new(pair: &'a PreparedPair, refine: bool, clock: StageClock) -> Self {
+    pub fn new(pair: &'a PreparedPair, refine: bool, clock: StageClock<'a>) -> Self {
         Self {
             pair,
             refine,
@@ -70,6 +71,9 @@ impl<'a> Search<'a> {
     pub fn propose(&mut self, sources: &[Box<dyn Proposals>]) -> Result<(), RefineError> {
         let mut proposals = std::mem::take(&mut self.spare);
         for source in sources {
+            if let Some(stage) = source.stage() {
+                self.clock.begin(stage);
+            }
             let Proposed { starts, spare, network, warning } = source.propose(self.pair);
             proposals.extend(starts);
             self.spare.extend(spare);
@@ -102,9 +106,10 @@ impl<'a> Search<'a> {
     /// for `stage`, that of the first ranking for [`Stage::Refine`].
     pub fn best(&mut self, stage: Stage) -> Result<Option<Best>, RefineError> {
         let Some(best) = StartSupport::best(&self.supports) else { return Ok(None) };
+        let stage = if self.clock.has(Stage::Refine) { stage } else { Stage::Refine };
+        self.clock.begin(stage);
         let found = if self.refine { self.refined(best)? } else { self.as_given(best) };
-        let first = !self.clock.has(Stage::Refine);
-        self.clock.lap(if first { Stage::Refine } else { stage });
+        self.clock.lap(stage);
         Ok(Some(found))
     }
 
@@ -167,6 +172,7 @@ mod tests {
 
     use super::*;
     use crate::Options;
+    use crate::event::Observed;
     use crate::target::Target;
 
     /// How far the answers of two rounds are from each other, in degrees: the first has a start that is off, the second the truth.
@@ -184,7 +190,7 @@ mod tests {
             Proposal { start, pose: by.compose(&pair.initial) }
         };
 
-        let mut search = Search::new(&pair, true, StageClock::after(Vec::new()));
+        let mut search = Search::new(&pair, true, StageClock::after(Vec::new(), Observed::default()));
         assert!(search.best(Stage::Refine).unwrap().is_none());
         let far = [off(Start::Icp, [90.0, 60.0, 20.0]), off(Start::Given, [-70.0, 40.0, 110.0])];
         search.add(&far).unwrap();

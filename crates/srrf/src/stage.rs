@@ -1,7 +1,6 @@
 //! [`Stage`]: what a registration spends its time on.
 
 use std::fmt;
-use std::time::Instant;
 
 use serde::{Serialize, Serializer};
 
@@ -67,34 +66,4 @@ pub struct StageTime {
     pub stage: Stage,
     /// Its wall time.
     pub seconds: f64,
-}
-
-/// Measures stages one after the other.
-#[derive(Debug)]
-pub(crate) struct StageClock {
-    last: Instant,
-    times: Vec<StageTime>,
-}
-
-impl StageClock {
-    /// Starts with stages that were measured before.
-    pub fn after(times: Vec<StageTime>) -> Self {
-        Self { last: Instant::now(), times }
-    }
-
-    /// The time since the last lap was this stage's.
-    pub fn lap(&mut self, stage: Stage) {
-        self.times.push(StageTime { stage, seconds: self.last.elapsed().as_secs_f64() });
-        self.last = Instant::now();
-    }
-
-    /// Whether this stage has had a lap.
-    pub fn has(&self, stage: Stage) -> bool {
-        self.times.iter().any(|time| time.stage == stage)
-    }
-
-    /// The stages so far.
-    pub fn into_times(self) -> Vec<StageTime> {
-        self.times
-    }
 }

@@ -10,6 +10,7 @@ use srrf_refine::{RefineSource, RefineTarget};
 use crate::error::Error;
 use crate::network::thinned;
 use crate::options::Options;
+use crate::scale::CloudSize;
 
 /// A target made ready, to register many sources to it. Copies share it.
 #[derive(Debug, Clone)]
@@ -29,6 +30,8 @@ pub(crate) struct TargetParts {
 pub(crate) struct PreparedCloud {
     /// About its own centre.
     pub centred: CentredCloud,
+    /// How large it is.
+    pub size: CloudSize,
     /// An even part of it, which the network looks at.
     pub thin: PointCloud,
     /// Its features.
@@ -39,7 +42,8 @@ impl PreparedCloud {
     fn new(cloud: &PointCloud, options: &Options) -> Result<Self, CloudError> {
         let centred = CentredCloud::new(cloud)?;
         let thin = thinned(&centred.cloud());
-        let side = Self { centred, thin, described: OnceLock::new() };
+        let size = CloudSize::of(&centred.cloud());
+        let side = Self { centred, size, thin, described: OnceLock::new() };
         if options.method.looks_globally() {
             side.features()?;
         }
@@ -59,6 +63,13 @@ impl PreparedCloud {
 }
 
 impl Target {
+    /// The cloud that it was made from, to the last digits.
+    pub(crate) fn cloud(&self) -> PointCloud {
+        let origin = self.0.side.centred.origin();
+        let back = Rigid { translation: origin, ..Rigid::identity() };
+        self.0.side.centred.cloud().transformed(&back)
+    }
+
     pub(crate) fn new(target: &PointCloud, options: &Options) -> Result<Self, Error> {
         let begun = Instant::now();
         let side = PreparedCloud::new(target, options).map_err(Error::Target)?;

@@ -8,6 +8,7 @@ use srrf_cloud::RegisterError;
 
 use crate::options::Method;
 use crate::probability::Probability;
+use crate::scale::ScaleDoubt;
 
 /// What a user should know of an answer. [`fmt::Display`] gives a sentence.
 #[derive(Debug, Clone)]
@@ -23,6 +24,15 @@ pub enum Warning {
     Doubtful {
         /// The probability that it is right.
         probability: Probability,
+    },
+    /// The clouds may be in different units of length.
+    Scale(ScaleDoubt),
+    /// A scale was asked for that the clouds do not determine well.
+    ScaleUndetermined {
+        /// What was found.
+        factor: f64,
+        /// Its standard error, where there is one.
+        spread: Option<f64>,
     },
     /// Points of a cloud were left out, because a coordinate is NaN or infinite.
     LeftOut {
@@ -57,6 +67,16 @@ impl fmt::Display for Warning {
                  to what they share.",
                 100.0 * probability.get()
             ),
+            Self::Scale(doubt) => write!(f, "The clouds may be in different units of length: {doubt}."),
+            Self::ScaleUndetermined { factor, spread: Some(spread) } => {
+                write!(
+                    f,
+                    "The clouds do not determine the scale well: {factor:.4} with a standard error of {spread:.4}."
+                )
+            }
+            Self::ScaleUndetermined { factor, spread: None } => {
+                write!(f, "The clouds do not determine the scale, {factor:.4} is as good as any other.")
+            }
             Self::LeftOut { cloud, points } => {
                 let were = if *points == 1 {
                     "point with NaN or infinity was"

@@ -7,7 +7,7 @@ use clap::Args;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use srrf_args::flags::{Quiet, Seed, value};
 use srrf_args::words::{count, points};
-use srrf_args::{Failure, Output, files};
+use srrf_args::{Failure, Output, ProgressArgs, files};
 use srrf_cloud::PointCloud;
 
 use super::list::list;
@@ -65,6 +65,9 @@ pub struct CorruptArgs {
 
     #[command(flatten)]
     quiet: Quiet,
+
+    #[command(flatten)]
+    progress: ProgressArgs,
 }
 
 /// Corrupts.
@@ -78,7 +81,10 @@ pub fn corrupt(args: &CorruptArgs) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     };
     files::check_cloud_output(output)?;
+    let progress = args.progress.start(args.quiet.quiet);
+    progress.step(format!("reading {input:?}"));
     let input = files::read(input, None)?;
+    progress.step(format!("corrupting {:?}", input.name));
     let (unit, frame) = input.cloud.to_unit_sphere();
     let corruption = corruption(kind, &args.reading.variants());
     let seed = args.seed.seed;
@@ -90,7 +96,9 @@ pub fn corrupt(args: &CorruptArgs) -> Result<ExitCode, Failure> {
         })?;
     let corrupted = PointCloud::new(moved.iter().map(|p| frame.undo(p)).collect())
         .map_err(|e| Failure::cloud(&input.name, &e))?;
+    progress.step(format!("writing {output:?}"));
     files::write_points(output, &corrupted)?;
+    progress.clear();
     let added = origin.iter().filter(|o| o.is_none()).count();
     let dropped = match input.dropped {
         0 => String::new(),

@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use rayon::ThreadPoolBuilder;
 use serde_json::{Value, json};
 use srrf::{Registrar, Request};
@@ -15,11 +14,12 @@ use super::batch_output::ResultLines;
 use super::batch_pairs::{ListedPair, PairList};
 use super::common::{failed, left_out, to_json, unusable};
 use super::method::MethodArgs;
+use super::scale::ScaleArgs;
 use super::transform;
 use srrf_args::Failure;
-use srrf_args::Output;
 use srrf_args::flags::{Common, value};
 use srrf_args::words::{count, counted};
+use srrf_args::{Output, Progress};
 use srrf_args::{files, interrupt};
 
 const HELP: &str = "Exit codes:
@@ -47,6 +47,9 @@ pub struct BatchArgs {
     method: MethodArgs,
 
     #[command(flatten)]
+    scale: ScaleArgs,
+
+    #[command(flatten)]
     common: Common,
 }
 
@@ -58,20 +61,23 @@ pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
     files::check_output(&args.output)?;
     let threads = args.common.threads.start()?;
     let pairs = PairList::read(&args.pairs)?;
-    let registrar = Registrar::new(args.method.options()).map_err(unusable)?;
+    let bar = args.common.progress();
+    bar.step("loading the network");
+    let registrar = Registrar::new(args.scale.options(args.method.options())).map_err(unusable)?;
     let described = args.describe();
     let (results, done) = ResultLines::open(&args.output, &pairs.rows, &described)?;
     let todo: Vec<&ListedPair> = pairs.rows.iter().filter(|row| !done.contains_key(&row.number)).collect();
     let out = Output::new(args.common.quiet.quiet, files::is_stream(&args.output));
+    bar.clear();
     if !done.is_empty() {
         out.say(&format!("{} of {} done already", count(done.len()), pairs_of(pairs.rows.len())));
     }
     interrupt::advise("; the same command goes on where this one stopped");
 
-    let bar = progress(todo.len(), args.common.quiet.quiet);
-    let batch = Batch { pairs: &pairs, registrar: &registrar, described: &described };
+    bar.counted("registering", todo.len(), "pairs");
+    let batch = Batch { pairs: &pairs, registrar: &registrar, described: &described, scale: args.scale };
     let tally = batch.run(&todo, threads, results, &bar)?;
-    bar.finish_and_clear();
+    bar.clear();
     let before = done.values().filter(|has_pose| !**has_pose).count();
     out.say(&format!(
         "{}: {} probably right, {} abstained, {} without a pose",
@@ -101,6 +107,7 @@ impl BatchArgs {
             "refine": !m.no_refine,
             "weights": m.weights.weights,
             "seed": m.seed.seed,
+            "scale": self.scale.describe(),
         })
     }
 }
@@ -116,6 +123,7 @@ struct Batch<'a> {
     pairs: &'a PairList,
     registrar: &'a Registrar,
     described: &'a Value,
+    scale: ScaleArgs,
 }
 
 impl Batch<'_> {
@@ -126,7 +134,7 @@ impl Batch<'_> {
         todo: &[&ListedPair],
         threads: usize,
         results: ResultLines,
-        bar: &ProgressBar,
+        bar: &Progress,
     ) -> Result<Tally, Failure> {
         let workers = threads.min(todo.len()).max(1);
         let next = AtomicUsize::new(0);
@@ -155,7 +163,7 @@ impl Batch<'_> {
                 if state.2.is_err() {
                     return;
                 }
-                bar.inc(1);
+                bar.advance(1);
             }
         };
         std::thread::scope(|scope| {
@@ -184,24 +192,15 @@ impl Batch<'_> {
     }
 
     fn register(&self, row: &ListedPair) -> Result<(Value, bool), Failure> {
-        let source = files::read_solid(&self.pairs.path(&row.source), None)?;
+        let mut source = files::read_solid(&self.pairs.path(&row.source), None)?;
+        self.scale.apply(&mut source)?;
         let target = files::read_solid(&self.pairs.path(&row.target), None)?;
         let initial = row.initial.as_ref().map(|file| transform::read(&self.pairs.path(file))).transpose()?;
         let request = Request { initial, ..Request::new(&source.cloud, &target.cloud) };
-        let found = self.registrar.register(&request);
+        let found = self.scale.register(self.registrar, &request);
         let mut outcome = found.map_err(|e| failed(e, &source.name, &target.name))?;
         let dropped = [source.dropped, target.dropped];
         outcome.warnings.extend([&source, &target].into_iter().filter_map(left_out));
         Ok((to_json(&outcome, &row.source, &row.target, dropped), outcome.abstain))
     }
-}
-
-/// A bar on the terminal, if there is one.
-fn progress(total: usize, quiet: bool) -> ProgressBar {
-    if quiet {
-        return ProgressBar::hidden();
-    }
-    let template = "{wide_bar} {pos}/{len} pairs, {eta} left";
-    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(total as u64).with_style(style)
 }

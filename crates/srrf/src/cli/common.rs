@@ -40,6 +40,9 @@ pub fn failed(error: srrf::Error, source: &str, target: &str) -> Failure {
         srrf::Error::Source(e) => Failure::cloud(source, &e),
         srrf::Error::Target(e) => Failure::cloud(target, &e),
         srrf::Error::Weights(_) | srrf::Error::Device(_) | srrf::Error::Calibration(_) => unusable(error),
+        srrf::Error::Scale(doubt) => Failure::usage(format!(
+            "{source:?} and {target:?} seem to be in different units of length: {doubt}"
+        )),
         srrf::Error::Copy(e) => Failure::other(e),
         srrf::Error::Stopped => Failure::other(error),
         srrf::Error::NoPose(_) | srrf::Error::NoSkeleton | srrf::Error::Refine(_) => Failure::failed(format!(

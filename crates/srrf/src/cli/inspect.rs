@@ -38,8 +38,12 @@ pub fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
     args.common.threads.start()?;
     let mut values = Vec::new();
     let mut failures = Vec::new();
+    let progress = args.common.progress();
     for path in &args.files {
-        match inspect(path) {
+        progress.step(format!("reading {path:?}"));
+        let inspected = inspect(path);
+        progress.clear();
+        match inspected {
             Ok((input, statistics)) if args.json => values.push(to_json(&input, &statistics)),
             Ok((input, statistics)) => {
                 let out = Output::new(args.common.quiet.quiet, false);

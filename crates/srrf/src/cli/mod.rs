@@ -17,11 +17,13 @@ mod method;
 mod page;
 mod register;
 mod rrd;
+mod scale;
 mod skeleton;
 mod statistics;
 mod summary;
 mod transform;
 mod view;
+mod watch;
 mod weights;
 
 use common::EXIT_CODES;

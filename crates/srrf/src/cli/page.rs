@@ -4,11 +4,11 @@ use std::path::Path;
 
 use clap::Args;
 use srrf::{Outcome, Warning};
-use srrf_args::flags::Axis;
 use srrf_cloud::{RIGHT_IN_WORDS, Rigid};
-use srrf_view::{Number, Page, Pair, Pose, Up};
+use srrf_view::{Number, Page, Pair, Pose, Tone, Up};
 
 use super::common::left_out;
+use srrf_args::Failure;
 use srrf_args::files::Input;
 use srrf_args::words::count;
 
@@ -19,19 +19,25 @@ pub struct PageArgs {
     #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
     unit: String,
 
-    #[command(flatten)]
-    up: srrf_args::flags::UpAxis,
+    /// The axis that points up in pictures: z, y, x, -z, -y or -x [default: guessed from the target]
+    #[arg(long, value_name = "AXIS", value_parser = axis, allow_hyphen_values = true)]
+    up: Option<Up>,
+}
+
+/// An axis by its name.
+fn axis(name: &str) -> Result<Up, String> {
+    let lower = name.to_ascii_lowercase();
+    let found = Up::ALL.into_iter().find(|up| up.name() == lower.trim_start_matches('+'));
+    found.ok_or_else(|| "an axis is one of z, y, x, -z, -y and -x".into())
 }
 
 impl PageArgs {
     /// A pair without poses.
     pub fn pair<'a>(&self, source: &'a Input, target: &'a Input) -> Pair<'a> {
-        let up = match self.up.up {
-            Axis::Z => Up::Z,
-            Axis::Y => Up::Y,
-        };
-        let mut pair =
-            Pair::new(title(source, target), &source.cloud, &target.cloud).unit(&*self.unit).up(up);
+        let mut pair = Pair::new(title(source, target), &source.cloud, &target.cloud).unit(&*self.unit);
+        if let Some(up) = self.up {
+            pair = pair.up(up);
+        }
         for input in [source, target] {
             if let Some(warning) = left_out(input) {
                 pair = pair.warning(warning.to_string());
@@ -50,14 +56,14 @@ pub fn title(source: &Input, target: &Input) -> String {
     format!("{} to {}", short(source), short(target))
 }
 
-/// The page of an answer.
-pub fn of_outcome(
+/// An answer, for a page or a picture.
+pub fn of_outcome<'a>(
     outcome: &Outcome,
-    source: &Input,
-    target: &Input,
+    source: &'a Input,
+    target: &'a Input,
     initial: Option<&Rigid>,
     args: &PageArgs,
-) -> String {
+) -> Pair<'a> {
     let e = &outcome.evidence;
     let verdict = if outcome.abstain { "abstain" } else { "probably right" };
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
@@ -67,6 +73,7 @@ pub fn of_outcome(
         .pose(Pose::new("result", outcome.target_from_source))
         .number(
             Number::text("Verdict", format!("{verdict} ({})", percent(outcome.probability.get())))
+                .tone(if outcome.abstain { Tone::Bad } else { Tone::Good })
                 .help(format!("probability that the pose is {RIGHT_IN_WORDS} of the true one")),
         )
         .number(Number::new("Rotation", angle).unit("°"))
@@ -107,5 +114,18 @@ pub fn of_outcome(
     for warning in outcome.warnings.iter().filter(|w| !matches!(w, Warning::LeftOut { .. })) {
         pair = pair.warning(warning.to_string());
     }
+    pair
+}
+
+/// A pair as a page.
+pub fn html(pair: Pair<'_>, source: &Input, target: &Input) -> String {
     Page::new(title(source, target)).pair(pair).to_html()
+}
+
+/// A pair as a picture.
+///
+/// # Errors
+/// [`Failure`], where the picture cannot be made.
+pub fn png(pair: &Pair<'_>) -> Result<Vec<u8>, Failure> {
+    srrf_view::to_png(pair).map_err(|e| Failure::failed(format!("cannot make the picture: {e}")).because(e))
 }

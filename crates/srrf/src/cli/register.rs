@@ -12,11 +12,13 @@ use srrf_cloud::io::Kept;
 use super::common::{EXIT_CODES, failed, left_out, to_json, unusable};
 use super::method::MethodArgs;
 use super::page::{self, PageArgs};
+use super::scale::{self, ScaleArgs};
+use super::watch::Watch;
 use super::{rrd, summary, transform};
 use srrf_args::Failure;
-use srrf_args::Output;
 use srrf_args::files::{self, Input};
 use srrf_args::flags::Common;
+use srrf_args::{Output, Progress};
 
 /// The exit code of an answer that is probably wrong.
 const ABSTAINED: u8 = 3;
@@ -50,6 +52,10 @@ pub struct RegisterArgs {
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
 
+    /// Write a picture that shows the answer: before, after, and the distances that are left
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
+
     /// Write a Rerun recording (builds with the feature `rerun`)
     #[arg(long, value_name = "FILE")]
     rrd: Option<PathBuf>,
@@ -60,6 +66,9 @@ pub struct RegisterArgs {
 
     #[command(flatten)]
     method: MethodArgs,
+
+    #[command(flatten)]
+    scale: ScaleArgs,
 
     /// Format of the source where it is a stream [default: by its content]
     #[arg(long, value_name = "NAME")]
@@ -85,18 +94,26 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
     let out = args.check()?;
     args.common.threads.start()?;
     let initial = args.initial.as_deref().map(transform::read).transpose()?;
+    let progress = args.common.progress();
+    progress.step(format!("reading {:?} and {:?}, loading the network", args.source, args.target));
     // The network loads while the files are read.
-    let (inputs, registrar) = rayon::join(|| args.read(), || Registrar::new(args.method.options()));
-    let (source, target) = inputs?;
+    let (inputs, registrar) =
+        rayon::join(|| args.read(), || Registrar::new(args.scale.options(args.method.options())));
+    let (mut source, target) = inputs?;
+    args.scale.apply(&mut source)?;
     let registrar = registrar.map_err(unusable)?;
     let opened = begun.elapsed().as_secs_f64();
 
-    let request = Request { initial, ..Request::new(&source.cloud, &target.cloud) };
-    let mut outcome = registrar.register(&request).map_err(|e| failed(e, &source.name, &target.name))?;
+    let watch = Watch::new(&progress);
+    let request = Request { initial, ..Request::new(&source.cloud, &target.cloud) }.observed_by(&watch);
+    let mut outcome =
+        args.scale.register(&registrar, &request).map_err(|e| failed(e, &source.name, &target.name))?;
+    scale::applied(&outcome, &mut source)?;
     outcome.times.insert(0, StageTime { stage: Stage::Open, seconds: opened });
     outcome.warnings.extend([&source, &target].into_iter().filter_map(left_out));
 
-    let written = args.write(&outcome, &source, &target, initial.as_ref())?;
+    let written = args.write(&outcome, &source, &target, initial.as_ref(), &progress)?;
+    progress.clear();
     if out != Output::Quiet {
         out.say(&summary::text(&outcome, &source, &target, begun.elapsed().as_secs_f64()));
         written.iter().for_each(|line| out.say(line));
@@ -113,7 +130,7 @@ impl RegisterArgs {
             ));
         }
         self.rrd.as_deref().map_or(Ok(()), rrd::check)?;
-        let outputs = [&self.output, &self.save, &self.json, &self.html, &self.rrd];
+        let outputs = [&self.output, &self.save, &self.json, &self.html, &self.png, &self.rrd];
         outputs.into_iter().flatten().try_for_each(|path| files::check_output(path))?;
         if let Some(path) = &self.save {
             files::check_cloud_output(path)?;
@@ -141,15 +158,28 @@ impl RegisterArgs {
         source: &Input,
         target: &Input,
         initial: Option<&Rigid>,
+        progress: &Progress,
     ) -> Result<Vec<String>, Failure> {
         let pose = &outcome.target_from_source;
         let mut lines = Vec::new();
+        let begin = |path: &Path| progress.step(format!("writing {path:?}"));
         if let Some(path) = &self.output {
+            begin(path);
             files::write(path, transform::to_text(pose).as_bytes())?;
             lines.push(wrote(path, "the pose"));
         }
         if let Some(path) = &self.save {
-            let what = match files::write_moved(path, &source.file, pose)? {
+            begin(path);
+            let written = if outcome.scale.is_none_or(|scale| scale.factor == 1.0) {
+                files::write_moved(path, &source.file, pose)?
+            } else {
+                files::write_points(path, &source.cloud.transformed(pose))?;
+                Kept::Points
+            };
+            let what = match written {
+                Kept::Points if outcome.scale.is_some() => {
+                    "the points of the source, scaled and moved, and nothing else"
+                }
                 Kept::Everything => "the moved source with all else that its file holds",
                 Kept::Points => {
                     "the moved points of the source; another format than the source's keeps nothing else"
@@ -158,16 +188,25 @@ impl RegisterArgs {
             lines.push(wrote(path, what));
         }
         if let Some(path) = &self.json {
+            begin(path);
             let value = to_json(outcome, &source.name, &target.name, [source.dropped, target.dropped]);
             files::write(path, format!("{value:#}\n").as_bytes())?;
             lines.push(wrote(path, "all figures"));
         }
         if let Some(path) = &self.html {
-            let html = page::of_outcome(outcome, source, target, initial, &self.page);
-            files::write(path, html.as_bytes())?;
+            begin(path);
+            let pair = page::of_outcome(outcome, source, target, initial, &self.page);
+            files::write(path, page::html(pair, source, target).as_bytes())?;
             lines.push(wrote(path, "open it in a browser"));
         }
+        if let Some(path) = &self.png {
+            begin(path);
+            let pair = page::of_outcome(outcome, source, target, initial, &self.page);
+            files::write(path, &page::png(&pair)?)?;
+            lines.push(wrote(path, "a picture: before, after, and the distances that are left"));
+        }
         if let Some(path) = &self.rrd {
+            begin(path);
             rrd::write(path, outcome, source, target)?;
             lines.push(wrote(path, "open it with `rerun`"));
         }

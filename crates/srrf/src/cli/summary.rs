@@ -27,6 +27,9 @@ pub fn text(outcome: &Outcome, source: &Input, target: &Input, seconds: f64) -> 
     let shift: [f64; 3] = (Vector3::from(pose.apply(&centre.into())) - centre).into();
     let scale = outcome.evidence.spacing;
     let translation: [f64; 3] = pose.translation.into();
+    if let Some(words) = super::scale::text(outcome) {
+        line("scale", &words);
+    }
     line("translation", &vector(translation, scale, 3));
     line("", &format!("the source's centre moves by {}", vector(shift, scale, 3)));
 
