@@ -33,7 +33,7 @@ impl Raster {
         let range = |centre: f64, size: usize| {
             let low = (centre - radius).ceil().max(0.0);
             let high = (centre + radius).floor().min(size as f64 - 1.0);
-            if low <= high { low as usize..=high as usize } else { 1..=0 }
+            if low <= high { low as usize..high as usize + 1 } else { 0..0 }
         };
         for row in range(y, self.height) {
             for column in range(x, self.width) {
