@@ -21,6 +21,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod building;
 mod card;
 pub mod cli;
 mod corruption;
@@ -34,6 +35,7 @@ mod pairs;
 mod severity;
 pub mod shapes;
 mod variants;
+pub mod views;
 
 pub use card::{Card, Family, REFERENCE_POINTS, Strength};
 pub use corruption::{CorruptError, Corrupted, Corruption, check_points};

@@ -38,6 +38,7 @@ mod describe;
 mod encode;
 mod encoded;
 mod html;
+mod map_page;
 mod number;
 mod page;
 mod pair;
@@ -49,6 +50,7 @@ mod up;
 
 pub use bundle::viewer_script;
 pub use html::viewer_element;
+pub use map_page::{MAP_POINTS, MapLink, MapPage, MapScan};
 pub use number::{Number, Tone};
 pub use page::{Page, ViewError};
 pub use pair::{Pair, PointValues, Pose};

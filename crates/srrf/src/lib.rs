@@ -25,6 +25,7 @@
 // The program's own modules speak of the library by its name, as any program does.
 extern crate self as srrf;
 
+mod align;
 mod benchmark;
 mod calibration;
 #[doc(hidden)]
@@ -50,6 +51,7 @@ mod start;
 mod target;
 mod warning;
 
+pub use align::align;
 pub use calibration::{CalibrationError, Logistic};
 pub use coarse::CoarsePose;
 pub use error::{Error, NoPose};
@@ -63,6 +65,7 @@ pub use registrar::Registrar;
 pub use request::{Request, RequestTarget};
 pub use scale::{AppliedScale, CloudSize, ScaleDoubt, ScaleOrigin};
 pub use skeleton::{FoundSkeleton, skeleton};
+pub use srrf_align::Map;
 pub use stage::{Stage, StageTime};
 pub use start::Start;
 pub use target::Target;

@@ -8,6 +8,12 @@ use clap::{CommandFactory, Parser, Subcommand};
 use srrf_args::{Failure, Scripts, interrupt};
 use srrf_corrupt::cli::{CorruptArgs, corrupt};
 
+mod align;
+mod align_edges;
+mod align_merge;
+mod align_page;
+mod align_poses;
+mod align_scans;
 mod batch;
 mod batch_output;
 mod batch_pairs;
@@ -43,6 +49,7 @@ enum Command {
     Register(Box<register::RegisterArgs>),
     Inspect(inspect::InspectArgs),
     Batch(batch::BatchArgs),
+    Align(Box<align::AlignArgs>),
     View(view::ViewArgs),
     Corrupt(CorruptArgs),
     Skeleton(skeleton::SkeletonArgs),
@@ -77,6 +84,7 @@ pub fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Register(args) => register::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Batch(args) => batch::run(&args),
+        Command::Align(args) => align::run(&args),
         Command::View(args) => view::run(&args),
         Command::Corrupt(args) => corrupt(&args),
         Command::Skeleton(args) => skeleton::run(&args),

@@ -1,0 +1,35 @@
+//! Many scans into one frame, and what may be trusted of it.
+//!
+//! [`align`] takes scans by number ([`Scans`]) and a method that registers two of them ([`RegisterPairs`]), and gives a [`Map`]:
+//!
+//! 1. Pairs that may overlap are chosen by descriptors, first guesses or order, and registered: the edges.
+//! 2. Loops of edges say which contradict each other, by belief propagation.
+//! 3. A pose graph with a truncated loss gives poses; scans that nothing joins are components of their own.
+//! 4. All poses are refined at once on the points, and get a covariance.
+//!
+//! It knows no network and no file: the crate `srrf` brings both.
+
+mod align;
+mod belief;
+mod consensus;
+mod graph;
+mod joint;
+mod likeness;
+mod loops;
+mod map;
+mod options;
+mod pair;
+mod placed;
+mod pool;
+mod rounds;
+mod se3;
+mod sparse;
+mod surface;
+mod trees;
+
+pub use align::align;
+pub use consensus::EdgeVerdict;
+pub use graph::{GraphEdge, Optimised, optimise};
+pub use map::{Map, MapEdge, OpenMotion, PairChoice, PlacedScan, WorstLoop};
+pub use options::{AlignError, AlignOptions, AlignProgress, AlignStage, PairReason};
+pub use pair::{NoStore, PairAnswer, PairStore, RegisterPairs, Scans};

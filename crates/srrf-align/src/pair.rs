@@ -1,0 +1,102 @@
+//! The seams of an alignment: scans by number, a method that registers two of them, and a store of pairs that are done.
+
+use std::borrow::Cow;
+use std::convert::Infallible;
+
+use serde::{Deserialize, Serialize};
+use srrf_cloud::{PointCloud, Rigid};
+
+/// Scans by number. They may be read anew each time they are asked for.
+pub trait Scans: Sync {
+    /// What can go wrong.
+    type Error: std::error::Error + Send + Sync + 'static;
+
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// One of them.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    fn cloud(&self, number: usize) -> Result<Cow<'_, PointCloud>, Self::Error>;
+}
+
+impl Scans for [PointCloud] {
+    type Error = Infallible;
+
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    fn cloud(&self, number: usize) -> Result<Cow<'_, PointCloud>, Infallible> {
+        Ok(Cow::Borrowed(&self[number]))
+    }
+}
+
+/// A method that registers two scans, the target made ready once for many sources.
+pub trait RegisterPairs: Sync {
+    /// A target made ready.
+    type Target: Send + Sync;
+    /// What can go wrong with a scan or the method; a pair without a pose is no error.
+    type Error: std::error::Error + Send + Sync + 'static;
+
+    /// Makes a target ready.
+    ///
+    /// # Errors
+    /// For a scan that cannot be a target.
+    fn prepare(&self, target: &PointCloud) -> Result<Self::Target, Self::Error>;
+
+    /// Lays a source on a target, from a first guess if there is one.
+    ///
+    /// # Errors
+    /// For a scan that cannot be a source.
+    fn register(
+        &self,
+        source: &PointCloud,
+        target: &Self::Target,
+        target_from_source: Option<Rigid>,
+    ) -> Result<PairAnswer, Self::Error>;
+}
+
+/// The registration of a pair.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PairAnswer {
+    /// The pose, in input coordinates; none where no pose was found.
+    pub target_from_source: Option<Rigid>,
+    /// Probability that it is right, in [0, 1].
+    pub probability: f64,
+    /// Whether that is too little.
+    pub abstain: bool,
+}
+
+impl PairAnswer {
+    /// No pose.
+    pub const NOTHING: Self = Self { target_from_source: None, probability: 0.0, abstain: true };
+}
+
+/// Pairs that are done, so that an alignment can go on where it stopped, and a scan be added later.
+pub trait PairStore: Sync {
+    /// The answer of a pair in this order, if it is there.
+    fn find(&self, source: usize, target: usize) -> Option<PairAnswer>;
+
+    /// Pairs that are there, whether or not they would be tried: they cost nothing.
+    fn pairs(&self) -> Vec<(usize, usize)> {
+        Vec::new()
+    }
+
+    /// Keeps an answer. Called in no certain order, from many threads.
+    fn keep(&self, source: usize, target: usize, answer: &PairAnswer);
+}
+
+/// Keeps nothing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NoStore;
+
+impl PairStore for NoStore {
+    fn find(&self, _: usize, _: usize) -> Option<PairAnswer> {
+        None
+    }
+
+    fn keep(&self, _: usize, _: usize, _: &PairAnswer) {}
+}

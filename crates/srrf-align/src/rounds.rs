@@ -1,0 +1,304 @@
+//! Which pairs are tried, round by round: what spans the scans first, then what joins components, then what closes loops.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use srrf_cloud::Rigid;
+
+use crate::consensus::{Consensus, EdgeVerdict, agree, group_of};
+use crate::likeness::{digests, likely_pairs};
+use crate::options::{AlignError, AlignOptions, AlignProgress, AlignStage, PairReason};
+use crate::pair::{RegisterPairs, Scans};
+use crate::pool::{Candidate, PairPool, Workplace};
+use crate::se3::shift;
+use crate::surface::ScanSurface;
+use crate::trees::Union;
+
+/// First guesses overlap from this share of the points on.
+const GUESSED_OVERLAP: f64 = 0.1;
+/// Loops are closed between scans that share this much in the map so far.
+const LOOP_OVERLAP: f64 = 0.25;
+/// Points of a scan that say whether two scans overlap.
+const OVERLAP_ASKED: usize = 150;
+/// Pairs of each scan in the first round, besides those of the spanning tree.
+const FIRST: usize = 2;
+const MOST_JOIN_ROUNDS: usize = 4;
+const LOOP_ROUNDS: usize = 2;
+/// Pairs that close loops, a scan and round.
+const LOOPS_PER_SCAN: usize = 2;
+/// Pairs less alike than this share of the median of those that hold are not tried to join components.
+const LIKENESS_FLOOR: f64 = 0.35;
+/// Neighbours in the map of which overlap is computed.
+const NEIGHBOURS: usize = 40;
+
+/// A choice of pairs.
+pub struct Rounds<'a, 'b, S: Scans + ?Sized, R: RegisterPairs> {
+    pub options: &'a AlignOptions,
+    pub place: &'a Workplace<'b, S, R>,
+    pub pool: PairPool,
+    /// Pairs whose descriptors were compared.
+    pub compared: usize,
+    /// The rounds, with the number of pairs of each.
+    pub sizes: Vec<(PairReason, usize)>,
+    /// Wall time of registering.
+    pub pair_seconds: f64,
+}
+
+type Failed<S, R> = AlignError<<S as Scans>::Error, <R as RegisterPairs>::Error>;
+
+impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
+    fn surfaces(&self) -> &[ScanSurface] {
+        self.place.surfaces
+    }
+
+    /// Tries all rounds.
+    ///
+    /// # Errors
+    /// [`AlignError`] for scans that cannot be read or used.
+    pub fn run(&mut self) -> Result<Consensus, Failed<S, R>> {
+        let found = self.chosen()?;
+        let kept: Vec<Candidate> = self
+            .place
+            .store
+            .pairs()
+            .into_iter()
+            .map(|(a, b)| self.candidate(a, b, PairReason::Kept))
+            .filter(|c| !self.pool.has(c.scans.0, c.scans.1))
+            .collect();
+        if kept.is_empty() {
+            return Ok(found);
+        }
+        self.try_pairs(PairReason::Kept, kept)?;
+        Ok(self.consensus())
+    }
+
+    /// The pairs that are chosen, round by round.
+    fn chosen(&mut self) -> Result<Consensus, Failed<S, R>> {
+        let n = self.surfaces().len();
+        let guessed = self.guessed();
+        if self.options.sequence {
+            let steps = (1..n).map(|i| self.candidate(i - 1, i, PairReason::Sequence)).collect();
+            self.try_pairs(PairReason::Sequence, steps)?;
+        }
+        if !guessed.is_empty() {
+            self.try_pairs(PairReason::Guess, guessed)?;
+        }
+        let begun = !self.pool.tried.is_empty();
+        if n <= self.options.all_pairs && !begun {
+            let all = (0..n)
+                .flat_map(|b| (0..b).map(move |a| (a, b)))
+                .map(|(a, b)| self.candidate(a, b, PairReason::All));
+            let all = all.collect();
+            self.try_pairs(PairReason::All, all)?;
+            return Ok(self.consensus());
+        }
+        let mut found = self.consensus();
+        if !begun || found.components.len() > 1 {
+            (self.place.progress)(AlignProgress { stage: AlignStage::Candidates, done: 0, total: n });
+            let digests =
+                digests(self.surfaces()).map_err(|(number, source)| AlignError::Cloud { number, source })?;
+            let alike = likely_pairs(self.surfaces(), &digests);
+            self.compared = alike.len();
+            if !begun {
+                let first = self.first_round(&alike);
+                self.try_pairs(PairReason::Alike, first)?;
+                found = self.consensus();
+            }
+            for _ in 0..MOST_JOIN_ROUNDS {
+                let joining = self.joining(&alike, &found);
+                if joining.is_empty() {
+                    break;
+                }
+                self.try_pairs(PairReason::Join, joining)?;
+                found = self.consensus();
+            }
+        }
+        for _ in 0..LOOP_ROUNDS {
+            let closing = self.closing(&found);
+            if closing.is_empty() {
+                break;
+            }
+            self.try_pairs(PairReason::Loop, closing)?;
+            found = self.consensus();
+        }
+        Ok(found)
+    }
+
+    fn try_pairs(&mut self, reason: PairReason, mut pairs: Vec<Candidate>) -> Result<(), Failed<S, R>> {
+        pairs.retain(|c| c.scans.0.max(c.scans.1) >= self.options.settled || self.kept(c.scans));
+        pairs.retain(|c| !self.pool.has(c.scans.0, c.scans.1));
+        self.sizes.push((reason, pairs.len()));
+        let begun = Instant::now();
+        let added = self.pool.add(&pairs, self.place);
+        self.pair_seconds += begun.elapsed().as_secs_f64();
+        added
+    }
+
+    fn kept(&self, (a, b): (usize, usize)) -> bool {
+        self.place.store.find(a, b).or_else(|| self.place.store.find(b, a)).is_some()
+    }
+
+    fn consensus(&self) -> Consensus {
+        (self.place.progress)(AlignProgress { stage: AlignStage::Graph, done: 0, total: 1 });
+        consensus_of(self.surfaces().len(), &self.pool)
+    }
+
+    fn candidate(&self, a: usize, b: usize, reason: PairReason) -> Candidate {
+        let guess = |i: usize| self.options.initial.get(i).copied().flatten();
+        let relative = guess(a).zip(guess(b)).map(|(a, b)| b.inverse().compose(&a));
+        Candidate {
+            scans: (a.min(b), a.max(b)),
+            reason,
+            guess: if a < b { relative } else { relative.map(|g| g.inverse()) },
+        }
+    }
+
+    /// Pairs whose first guesses overlap.
+    fn guessed(&self) -> Vec<Candidate> {
+        let guesses: Vec<Option<Rigid>> = self
+            .surfaces()
+            .iter()
+            .enumerate()
+            .map(|(i, s)| {
+                self.options.initial.get(i).copied().flatten().map(|g| g.compose(&shift(&s.centre)))
+            })
+            .collect();
+        let known: Vec<usize> = (0..guesses.len()).filter(|i| guesses[*i].is_some()).collect();
+        let poses: Vec<Rigid> = guesses.iter().map(|g| g.unwrap_or_else(Rigid::identity)).collect();
+        let pairs = overlapping(self.surfaces(), &poses, &known, GUESSED_OVERLAP);
+        limited(&pairs, self.options.pairs_per_scan)
+            .into_iter()
+            .map(|(a, b)| self.candidate(a, b, PairReason::Guess))
+            .collect()
+    }
+
+    /// A spanning tree of the pairs most alike, and the best few of each scan.
+    fn first_round(&self, alike: &[(usize, usize, f64)]) -> Vec<Candidate> {
+        let n = self.surfaces().len();
+        let mut union = Union::new(n);
+        let mut count = vec![0; n];
+        let mut chosen = Vec::new();
+        for &(a, b, _) in alike {
+            let spans = union.join(a, b);
+            if spans || count[a] < FIRST || count[b] < FIRST {
+                count[a] += 1;
+                count[b] += 1;
+                chosen.push(self.candidate(a, b, PairReason::Alike));
+            }
+        }
+        chosen
+    }
+
+    /// For each scan outside the largest component, the most alike scan of another component.
+    fn joining(&self, alike: &[(usize, usize, f64)], found: &Consensus) -> Vec<Candidate> {
+        if found.components.len() < 2 {
+            return Vec::new();
+        }
+        let n = self.surfaces().len();
+        let group = group_of(n, &found.components);
+        let of: BTreeMap<(usize, usize), f64> = alike.iter().map(|&(a, b, score)| ((a, b), score)).collect();
+        let mut holding: Vec<f64> = self
+            .pool
+            .tried
+            .iter()
+            .zip(&found.verdicts)
+            .filter(|(_, v)| **v == EdgeVerdict::Holds)
+            .filter_map(|(t, _)| of.get(&(t.source.min(t.target), t.source.max(t.target))).copied())
+            .collect();
+        holding.sort_by(f64::total_cmp);
+        let floor = holding.get(holding.len() / 2).map_or(0.0, |median| LIKENESS_FLOOR * median);
+        let mut tried = vec![0; n];
+        for pair in &self.pool.tried {
+            tried[pair.source] += 1;
+            tried[pair.target] += 1;
+        }
+        let mut given = vec![0; n];
+        let mut chosen = Vec::new();
+        for &(a, b, _) in alike.iter().filter(|p| p.2 >= floor) {
+            if group[a] == group[b] || self.pool.has(a, b) {
+                continue;
+            }
+            // A scan of the largest component asks for nothing.
+            let asks = |i: usize| group[i] > 0 && given[i] < 1 && tried[i] < self.options.pairs_per_scan;
+            if asks(a) || asks(b) {
+                given[a] += usize::from(group[a] > 0);
+                given[b] += usize::from(group[b] > 0);
+                chosen.push(self.candidate(a, b, PairReason::Join));
+            }
+        }
+        chosen
+    }
+
+    /// Pairs that overlap in the map so far and were not tried, from the guess that it gives.
+    fn closing(&self, found: &Consensus) -> Vec<Candidate> {
+        let mut pairs = Vec::new();
+        for group in &found.components {
+            pairs.extend(overlapping(self.surfaces(), &found.poses, group, LOOP_OVERLAP));
+        }
+        pairs.retain(|(a, b, _)| !self.pool.has(*a, *b));
+        pairs.sort_by(|x, y| y.2.total_cmp(&x.2).then((x.0, x.1).cmp(&(y.0, y.1))));
+        limited(&pairs, LOOPS_PER_SCAN)
+            .into_iter()
+            .map(|(a, b)| {
+                let input = |i: usize| found.poses[i].compose(&shift(&-self.surfaces()[i].centre));
+                let guess = Some(input(b).inverse().compose(&input(a)));
+                Candidate { scans: (a, b), reason: PairReason::Loop, guess }
+            })
+            .collect()
+    }
+}
+
+/// What the pairs so far agree on.
+pub fn consensus_of(scans: usize, pool: &PairPool) -> Consensus {
+    let edges: Vec<_> = pool.tried.iter().map(|t| t.edge.clone()).collect();
+    let prior: Vec<f64> = pool.tried.iter().map(|t| t.prior).collect();
+    let abstains: Vec<bool> = pool.tried.iter().map(|t| t.answer.abstain).collect();
+    agree(scans, &edges, &prior, &abstains)
+}
+
+/// The pairs of `members` that overlap by at least `least` in these poses of the centred scans: `(a, b, share)`, `a < b`.
+pub fn overlapping(
+    surfaces: &[ScanSurface],
+    poses: &[Rigid],
+    members: &[usize],
+    least: f64,
+) -> Vec<(usize, usize, f64)> {
+    use rayon::prelude::*;
+    let mut pairs: Vec<(usize, usize)> = Vec::new();
+    for &a in members {
+        let mut near: Vec<(f64, usize)> = members
+            .iter()
+            .filter(|b| **b != a)
+            .map(|&b| ((poses[a].translation - poses[b].translation).norm(), b))
+            .filter(|(apart, b)| *apart <= surfaces[a].reach + surfaces[*b].reach)
+            .collect();
+        near.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        near.truncate(NEIGHBOURS);
+        pairs.extend(near.into_iter().map(|(_, b)| (a.min(b), a.max(b))));
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+        .into_par_iter()
+        .map(|(a, b)| {
+            let b_from_a = poses[b].inverse().compose(&poses[a]);
+            (a, b, surfaces[b].overlap(&surfaces[a], &b_from_a, OVERLAP_ASKED))
+        })
+        .filter(|pair| pair.2 >= least)
+        .collect()
+}
+
+/// In this order, those of which one scan has fewer than `most` so far.
+fn limited(pairs: &[(usize, usize, f64)], most: usize) -> Vec<(usize, usize)> {
+    let mut count: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut chosen = Vec::new();
+    for &(a, b, _) in pairs {
+        let few = [a, b].iter().any(|i| count.get(i).copied().unwrap_or(0) < most);
+        if few {
+            *count.entry(a).or_default() += 1;
+            *count.entry(b).or_default() += 1;
+            chosen.push((a, b));
+        }
+    }
+    chosen
+}

@@ -1,0 +1,256 @@
+//! [`ScanSurface`]: a scan thinned, indexed and with normals, about its own mean; and how two of them lie on each other.
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+use srrf_cloud::{
+    CloudError, KnnIndex, PointCloud, Rigid, estimate_normals, point_spacing, spacing_of, thin_to,
+};
+
+use crate::se3::shift;
+
+/// Neighbours of a normal.
+const NORMAL_NEIGHBOURS: usize = 12;
+/// Matches are within so many spacings of the thinned points.
+const NEAR_SPACINGS: f64 = 1.5;
+/// Matched normals differ by less than acos(0.7), 46 degrees, either way round.
+const SAME_NORMAL: f64 = 0.7;
+/// Neighbouring residuals are alike: so many matches count as one.
+pub const ALIKE_MATCHES: f64 = 20.0;
+/// Points of a scan that are asked for its matches.
+const ASKED: usize = 1500;
+/// A right registration is within this share of the radius and this many spacings of the truth, three standard deviations.
+const TOLERANCE_RADII: f64 = 0.015;
+const TOLERANCE_SPACINGS: f64 = 1.0;
+
+/// A scan made ready.
+#[derive(Debug)]
+pub struct ScanSurface {
+    /// Mean of the points, input coordinates; all else is about it.
+    pub centre: Vector3<f64>,
+    /// Root mean square distance of the points from the centre.
+    pub radius: f64,
+    /// Largest distance of a point from the centre.
+    pub reach: f64,
+    /// Median distance between neighbours in the whole scan.
+    pub spacing: f64,
+    index: KnnIndex,
+    normals: Vec<Vector3<f64>>,
+    /// The same among the thinned points.
+    thin_spacing: f64,
+}
+
+/// A point of one scan that lies on the surface of another.
+#[derive(Debug, Clone, Copy)]
+pub struct SurfaceMatch {
+    /// The point, in its own frame.
+    pub point: Vector3<f64>,
+    /// The point moved to the other's frame.
+    pub moved: Vector3<f64>,
+    /// Unit normal there, the other's frame.
+    pub normal: Vector3<f64>,
+    /// Distance along the normal.
+    pub off: f64,
+}
+
+/// How two scans lie on each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Overlay {
+    /// Share of the source's points that lie on the target.
+    pub overlap_source: f64,
+    /// Share of the target's points that lie on the source.
+    pub overlap_target: f64,
+    /// Root mean square distance of those, along the normals.
+    pub rms: f64,
+    /// Inverse covariance of a motion after the pose, in the target's frame about its centre; rotation first.
+    pub information: Matrix6<f64>,
+}
+
+impl ScanSurface {
+    /// Thins `cloud` to at most `most` points.
+    ///
+    /// # Errors
+    /// [`CloudError`] for fewer than three points.
+    pub fn new(cloud: &PointCloud, most: usize) -> Result<Self, CloudError> {
+        let centre = cloud.centroid();
+        let centred: Vec<[f64; 3]> =
+            cloud.points().iter().map(|p| (Vector3::from(*p) - centre).into()).collect();
+        let squared = |p: &[f64; 3]| Vector3::from(*p).norm_squared();
+        let radius = (centred.iter().map(squared).sum::<f64>() / centred.len() as f64).sqrt();
+        let reach = centred.iter().map(squared).fold(0.0, f64::max).sqrt();
+        let spacing = point_spacing(&centred)?;
+        let thin = thin_to(&PointCloud::new(centred)?, most, radius);
+        let normals =
+            estimate_normals(thin.points(), NORMAL_NEIGHBOURS)?.into_iter().map(Vector3::from).collect();
+        let index = KnnIndex::new(thin.points())?;
+        let thin_spacing = spacing_of(&index);
+        Ok(Self { centre, radius, reach, spacing, index, normals, thin_spacing })
+    }
+
+    /// The thinned points about the centre.
+    pub fn points(&self) -> &[[f64; 3]] {
+        self.index.points()
+    }
+
+    /// A pose between inputs as one between the centred scans.
+    pub fn centred(&self, source: &Self, target_from_source: &Rigid) -> Rigid {
+        shift(&-self.centre).compose(target_from_source).compose(&shift(&source.centre))
+    }
+
+    /// How far a right registration with another may be off.
+    pub fn tolerance(&self, other: &Self) -> f64 {
+        TOLERANCE_RADII * self.radius.max(other.radius) + TOLERANCE_SPACINGS * self.spacing.max(other.spacing)
+    }
+
+    /// Distance within which points of two scans are matched.
+    pub fn near(&self, other: &Self) -> f64 {
+        NEAR_SPACINGS * self.thin_spacing.max(other.thin_spacing)
+    }
+
+    /// The points of `source`, every n-th, that lie within `near` of this surface; and how many were asked.
+    pub fn matches(
+        &self,
+        source: &Self,
+        self_from_source: &Rigid,
+        near: f64,
+        asked: usize,
+    ) -> (Vec<SurfaceMatch>, usize) {
+        let step = source.points().len().div_ceil(asked.max(1)).max(1);
+        let limit = near * near;
+        let mut count = 0;
+        let mut found = Vec::new();
+        for (p, normal) in source.points().iter().zip(&source.normals).step_by(step) {
+            count += 1;
+            let moved = self_from_source.apply(p);
+            if Vector3::from(moved).norm() > self.reach + near {
+                continue;
+            }
+            let (nearest, squared) = self.index.nearest(&moved);
+            let fixed = self.normals[nearest];
+            let turned = self_from_source.rotation * normal;
+            if squared <= limit && turned.dot(&fixed).abs() > SAME_NORMAL {
+                let moved = Vector3::from(moved);
+                let off = fixed.dot(&(moved - Vector3::from(self.points()[nearest])));
+                found.push(SurfaceMatch { point: Vector3::from(*p), moved, normal: fixed, off });
+            }
+        }
+        (found, count)
+    }
+
+    /// The larger of the two shares of points that lie on the other, by few points.
+    pub fn overlap(&self, source: &Self, self_from_source: &Rigid, asked: usize) -> f64 {
+        if self_from_source.translation.norm() > self.reach + source.reach {
+            return 0.0;
+        }
+        let near = self.near(source);
+        let share = |(found, count): (Vec<SurfaceMatch>, usize)| found.len() as f64 / count.max(1) as f64;
+        share(self.matches(source, self_from_source, near, asked)).max(share(source.matches(
+            self,
+            &self_from_source.inverse(),
+            near,
+            asked,
+        )))
+    }
+
+    /// How the source lies on this surface in a pose between the centred scans.
+    pub fn overlay(&self, source: &Self, self_from_source: &Rigid) -> Overlay {
+        let near = self.near(source);
+        let (onto, asked) = self.matches(source, self_from_source, near, ASKED);
+        let (back, asked_back) = source.matches(self, &self_from_source.inverse(), near, ASKED);
+        let (mut hessian, mut squares) = (Matrix6::zeros(), 0.0);
+        for m in &onto {
+            let j = row(&m.moved, &m.normal);
+            hessian += j * j.transpose();
+            squares += m.off * m.off;
+        }
+        for m in &back {
+            // The point is the target's own; the normal is turned into its frame.
+            let j = row(&m.point, &(self_from_source.rotation * m.normal));
+            hessian += j * j.transpose();
+            squares += m.off * m.off;
+        }
+        let count = onto.len() + back.len();
+        let rms = if count > 0 { (squares / count as f64).sqrt() } else { 0.0 };
+        let sigma = rms.max(0.3 * self.spacing.max(source.spacing)).max(f64::MIN_POSITIVE.sqrt());
+        Overlay {
+            overlap_source: onto.len() as f64 / asked.max(1) as f64,
+            overlap_target: back.len() as f64 / asked_back.max(1) as f64,
+            rms,
+            information: self.with_floor(source, &(hessian / (ALIKE_MATCHES * sigma * sigma))),
+        }
+    }
+
+    /// The information of a registration: no better than the tolerance, and no worse than the size of the scans.
+    fn with_floor(&self, source: &Self, measured: &Matrix6<f64>) -> Matrix6<f64> {
+        let radius = self.radius.max(source.radius).max(f64::MIN_POSITIVE.sqrt());
+        let sigma = self.tolerance(source).max(1e-9 * radius) / 3.0;
+        let diagonal = |turn: f64, along: f64| {
+            Matrix6::from_diagonal(&Vector6::new(turn, turn, turn, along, along, along))
+        };
+        // A motion that nothing determines has a standard deviation of a radius.
+        let weakest = diagonal(1.0, radius.powi(-2));
+        let floor = diagonal((sigma / radius).powi(2), sigma * sigma);
+        let covariance =
+            (measured + weakest).try_inverse().unwrap_or_else(|| diagonal(1.0, radius * radius)) + floor;
+        covariance.try_inverse().unwrap_or(weakest)
+    }
+}
+
+/// How far a point moves along a normal with a twist.
+pub fn row(point: &Vector3<f64>, normal: &Vector3<f64>) -> Vector6<f64> {
+    let moment = point.cross(normal);
+    Vector6::new(moment.x, moment.y, moment.z, normal.x, normal.y, normal.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::se3::exp;
+
+    /// A corner of three walls: `n` by `n` points a wall.
+    fn corner(n: usize, walls: usize) -> PointCloud {
+        let grid = |i: usize, j: usize| (i as f64 / n as f64 + 0.013, j as f64 / n as f64 + 0.007);
+        let points = (0..walls).flat_map(|wall| {
+            (0..n * n).map(move |k| {
+                let (u, v) = grid(k / n, k % n);
+                [[u, v, 0.0], [u, 0.0, v], [0.0, u, v]][wall]
+            })
+        });
+        PointCloud::new(points.map(|p| p.map(|c| c + 100.0)).collect()).unwrap()
+    }
+
+    #[test]
+    fn a_scan_lies_on_itself_and_the_corner_holds_it() {
+        let surface = ScanSurface::new(&corner(40, 3), 2000).unwrap();
+        let whole = surface.overlay(&surface, &Rigid::identity());
+        assert!(whole.overlap_source > 0.97 && whole.overlap_target > 0.97 && whole.rms < 1e-3, "{whole:?}");
+        let spread = whole.information.try_inverse().unwrap();
+        let sigma = surface.tolerance(&surface) / 3.0;
+        assert!(spread[(3, 3)].sqrt() < 2.0 * sigma && spread[(3, 3)].sqrt() >= sigma, "{spread}");
+        let away = exp(&Vector6::new(0.0, 0.0, 0.0, 5.0, 0.0, 0.0));
+        assert_eq!(surface.overlap(&surface, &away, 200), 0.0);
+    }
+
+    #[test]
+    fn a_plane_slides_and_its_information_says_so() {
+        let surface = ScanSurface::new(&corner(40, 1), 2000).unwrap();
+        let spread = surface.overlay(&surface, &Rigid::identity()).information.try_inverse().unwrap();
+        let deviations: Vec<f64> = (0..6).map(|i| spread[(i, i)].sqrt()).collect();
+        // Turns about x and y and the shift along z are held; the others are free.
+        let radius = surface.radius;
+        assert!(deviations[3] > 0.9 * radius && deviations[4] > 0.9 * radius, "{deviations:?}");
+        assert!(
+            deviations[5] < 0.05 * radius && deviations[0] < 0.05 && deviations[2] > 0.9,
+            "{deviations:?}"
+        );
+    }
+
+    #[test]
+    fn poses_between_inputs_and_centred_scans() {
+        let cloud = corner(12, 3);
+        let motion = exp(&Vector6::new(0.3, -0.2, 0.5, 7.0, 1.0, -2.0));
+        let moved = PointCloud::new(cloud.points().iter().map(|p| motion.apply(p)).collect()).unwrap();
+        let (source, target) =
+            (ScanSurface::new(&cloud, 500).unwrap(), ScanSurface::new(&moved, 500).unwrap());
+        let centred = target.centred(&source, &motion);
+        assert!(centred.translation.norm() < 1e-9, "means lie on each other: {centred:?}");
+    }
+}

@@ -1,0 +1,342 @@
+//! `srrf align`: many scans in, one map out.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use srrf::Registrar;
+use srrf_align::{AlignError, AlignOptions, AlignProgress, AlignStage, Map};
+use srrf_args::flags::{Common, value};
+use srrf_args::words::{count, counted, length};
+use srrf_args::{Failure, Output, files, interrupt};
+
+use super::align_edges::EdgeFile;
+use super::align_merge::{MergeArgs, merge};
+use super::align_page;
+use super::align_poses::{self, Known};
+use super::align_scans::ScanFiles;
+use super::common::unusable;
+use super::method::MethodArgs;
+use super::page::PageArgs;
+
+/// The exit code of a map in which not every scan is placed.
+const ABSTAINED: u8 = 3;
+
+const HELP: &str = "Exit codes:
+  0    all scans are in one map, each probably right
+  1    failure: an output could not be written
+  2    bad usage or input
+  3    the poses were written, but some scans are in maps of their own, or may well be wrong
+  130  interrupted; with --edges the same command goes on where it stopped";
+
+/// Lay many scans in one frame, and say which may be trusted.
+///
+/// Files, or folders of files; in any order, of any sizes, one unit. Pairs that may overlap are registered, those that contradict the
+/// others are found, and all poses are made to agree. Scans that nothing joins make maps of their own: two rooms
+/// without overlap give two maps.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct AlignArgs {
+    /// The scans: files, or folders of them; `file.e57#2` is the second scan of a file
+    #[arg(required_unless_present = "add")]
+    scans: Vec<PathBuf>,
+
+    /// Write all poses and what is known of them, as JSON
+    #[arg(short, long, value_name = value::FILE)]
+    output: Option<PathBuf>,
+
+    /// Write the poses of the largest map as TUM: number of the scan from 0, translation, quaternion x y z w
+    #[arg(long, value_name = value::FILE)]
+    tum: Option<PathBuf>,
+
+    /// Write the poses as KITTI: 3 rows of 4 on a line, one line a scan; for a single map
+    #[arg(long, value_name = value::FILE)]
+    kitti: Option<PathBuf>,
+
+    #[command(flatten)]
+    merge: MergeArgs,
+
+    /// Write a page that shows the map, for any browser
+    #[arg(long, value_name = value::FILE)]
+    html: Option<PathBuf>,
+
+    /// Keep registered pairs here, and take those that are there: the same command goes on where it stopped
+    #[arg(long, value_name = value::FILE)]
+    edges: Option<PathBuf>,
+
+    /// Add the scans to those of this earlier result (JSON of `--output`); with `--edges` only pairs with new scans are registered
+    #[arg(long, value_name = value::FILE)]
+    add: Option<PathBuf>,
+
+    /// First guesses of the poses: JSON of `--output`, TUM or KITTI
+    #[arg(long, value_name = value::FILE)]
+    initial: Option<PathBuf>,
+
+    /// The scans were taken one after the other, in this order, each overlapping the next
+    #[arg(long)]
+    sequence: bool,
+
+    /// Try all pairs, however many scans there are
+    #[arg(long)]
+    all_pairs: bool,
+
+    /// Memory to keep within, in GB: scans that do not fit are read again when they are needed
+    #[arg(long, value_name = "GB", value_parser = gigabytes)]
+    max_memory: Option<f64>,
+
+    /// Leave out the joint refinement on the points
+    #[arg(long)]
+    no_joint: bool,
+
+    #[command(flatten)]
+    method: MethodArgs,
+
+    #[command(flatten)]
+    page: PageArgs,
+
+    #[command(flatten)]
+    common: Common,
+}
+
+fn gigabytes(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("a number above 0, such as 4 or 0.5".into()),
+    }
+}
+
+/// Aligns.
+///
+/// # Errors
+/// [`Failure`], with its exit code.
+pub fn run(args: &AlignArgs) -> Result<ExitCode, Failure> {
+    let begun = Instant::now();
+    let out = args.check()?;
+    args.common.threads.start()?;
+    let known = args.add.as_deref().map(align_poses::read_result).transpose()?;
+    let scans = args.open(known.as_ref())?;
+    let initial = match (&args.initial, &known) {
+        (Some(path), _) => align_poses::read_initial(path, &scans.names())?,
+        (None, Some(known)) => known.guesses(scans.len()),
+        (None, None) => Vec::new(),
+    };
+    let registrar = Registrar::new(args.method.options()).map_err(unusable)?;
+    let edges = EdgeFile::open(args.edges.as_deref(), &scans, &registrar.options().to_string())?;
+    if edges.known() > 0 {
+        out.say(&format!("{} known already", counted(edges.known(), "pair")));
+    }
+    if args.edges.is_some() {
+        interrupt::advise("; the same command goes on where this one stopped");
+    }
+    let options = AlignOptions {
+        initial,
+        sequence: args.sequence,
+        settled: known.as_ref().map_or(0, |k| k.scans.len()),
+        all_pairs: if args.all_pairs { usize::MAX } else { AlignOptions::default().all_pairs },
+        refine: !args.no_joint,
+        at_once: Some(scans.at_once(rayon::current_num_threads())),
+        ..AlignOptions::default()
+    };
+    let bar = bar(args.common.quiet.quiet);
+    let map = srrf_align::align(&scans, &registrar, &options, &edges, &|p| show(&bar, p));
+    bar.finish_and_clear();
+    let map = map.map_err(|e| failed(e, &scans))?;
+    edges.finish()?;
+    let seconds = begun.elapsed().as_secs_f64();
+
+    let written = args.write(&map, &scans, &registrar, seconds);
+    if out != Output::Quiet {
+        out.say(&summary(&map, &scans, begun.elapsed().as_secs_f64()));
+    }
+    written?.iter().for_each(|line| out.say(line));
+    let doubtful = map.components.len() > 1 || map.scans.iter().any(|s| s.abstain);
+    Ok(if doubtful { ExitCode::from(ABSTAINED) } else { ExitCode::SUCCESS })
+}
+
+impl AlignArgs {
+    /// Checks what can be checked before any work, and finds where to speak.
+    fn check(&self) -> Result<Output, Failure> {
+        if self.all_pairs && self.sequence {
+            return Err(Failure::usage(
+                "--all-pairs tries all pairs, --sequence those in order: give one of them".into(),
+            ));
+        }
+        let outputs = [&self.output, &self.tum, &self.kitti, &self.merge.save, &self.html];
+        outputs.into_iter().flatten().try_for_each(|path| files::check_output(path))?;
+        self.merge.check()?;
+        if let Some(path) = &self.edges {
+            if files::is_stream(path) {
+                return Err(Failure::usage(
+                    "--edges is a file that is read and written: it cannot be `-`".into(),
+                ));
+            }
+            files::check_output(path)?;
+        }
+        let streams = outputs.into_iter().flatten().filter(|path| files::is_stream(path)).count();
+        if streams > 1 {
+            return Err(Failure::usage(format!(
+                "{streams} results are to go to `-`: standard output takes one; name files for the others"
+            )));
+        }
+        Ok(Output::new(self.common.quiet.quiet, streams > 0))
+    }
+
+    fn open(&self, known: Option<&Known>) -> Result<ScanFiles, Failure> {
+        let before: Vec<PathBuf> = known.map_or_else(Vec::new, Known::paths);
+        let budget = self.max_memory.map(|gb| gb * 1e9);
+        ScanFiles::open(&before, &self.scans, budget)
+    }
+
+    /// Writes what was asked for; says what was written.
+    fn write(
+        &self,
+        map: &Map,
+        scans: &ScanFiles,
+        registrar: &Registrar,
+        seconds: f64,
+    ) -> Result<Vec<String>, Failure> {
+        let mut lines = Vec::new();
+        if let Some(path) = &self.output {
+            let json = align_poses::to_json(map, scans, &registrar.options().to_string(), seconds);
+            files::write(path, format!("{json:#}\n").as_bytes())?;
+            lines.push(wrote(path, "all poses and figures"));
+        }
+        if let Some(path) = &self.tum {
+            files::write(path, align_poses::to_tum(map, scans).as_bytes())?;
+            lines.push(wrote(path, "the poses of the largest map, as TUM"));
+        }
+        if let Some(path) = &self.kitti {
+            files::write(path, align_poses::to_kitti(map)?.as_bytes())?;
+            lines.push(wrote(path, "the poses, as KITTI"));
+        }
+        if let Some(path) = &self.merge.save {
+            let (points, of) = merge(map, scans, &self.merge, path)?;
+            let what = format!(
+                "{} of {} points of the largest map, with the number of their scan",
+                count(points),
+                count(of)
+            );
+            lines.push(wrote(path, &what));
+        }
+        if let Some(path) = &self.html {
+            files::write(path, align_page::page(map, scans, &self.page)?.as_bytes())?;
+            lines.push(wrote(path, "open it in a browser"));
+        }
+        Ok(lines)
+    }
+}
+
+fn wrote(path: &std::path::Path, what: &str) -> String {
+    let name = if files::is_stream(path) { "standard output".to_owned() } else { path.display().to_string() };
+    format!("wrote {name}: {what}")
+}
+
+/// The failure behind an error of the library, which knows no files.
+fn failed(error: AlignError<Failure, srrf::Error>, scans: &ScanFiles) -> Failure {
+    match error {
+        AlignError::TooFew(n) => Failure::usage(format!(
+            "{} given: at least two scans are needed; name more files, or a folder of them",
+            counted(n, "scan")
+        )),
+        AlignError::Scan { source, .. } => source,
+        AlignError::Cloud { number, source } => Failure::cloud(&scans.name(number), &source),
+        AlignError::Register { number, source } => match source {
+            srrf::Error::Source(e) | srrf::Error::Target(e) => Failure::cloud(&scans.name(number), &e),
+            other => Failure::failed(format!("{:?}: {other}", scans.name(number))).because(other),
+        },
+        other @ (AlignError::Guesses { .. } | AlignError::Guess(_)) => Failure::input(other),
+    }
+}
+
+fn bar(quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{msg:18} {wide_bar} {pos}/{len}, {elapsed}");
+    ProgressBar::new(1).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+fn show(bar: &ProgressBar, progress: AlignProgress) {
+    bar.set_message(progress.stage.to_string());
+    bar.set_length(progress.total as u64);
+    // Threads report out of order.
+    if progress.stage != AlignStage::Pairs || progress.done as u64 > bar.position() {
+        bar.set_position(progress.done as u64);
+    }
+}
+
+/// The map in words and figures.
+fn summary(map: &Map, scans: &ScanFiles, seconds: f64) -> String {
+    let mut lines = Vec::new();
+    let mut line = |label: &str, text: String| lines.push(format!("{label:12} {text}"));
+    line("scans", counted(map.scans.len(), "scan"));
+    let several: Vec<_> = map.components.iter().filter(|c| c.len() > 1).collect();
+    let alone: Vec<String> =
+        map.components.iter().filter(|c| c.len() == 1).map(|c| scans.name(c[0])).collect();
+    let sizes: Vec<String> = several.iter().map(|c| count(c.len())).collect();
+    line(
+        "maps",
+        match several.len() {
+            0 => "none: nothing joins any two scans".into(),
+            1 => format!("one, of {} scans", sizes[0]),
+            n => {
+                format!("{n}, of {} scans; nothing is known of how they lie to each other", sizes.join(", "))
+            }
+        },
+    );
+    if !alone.is_empty() {
+        line("alone", format!("{}: {}", counted(alone.len(), "scan"), shortened(&alone)));
+    }
+    let doubtful: Vec<String> = (0..map.scans.len())
+        .filter(|i| map.scans[*i].abstain && map.components[map.scans[*i].component].len() > 1)
+        .map(|i| scans.name(i))
+        .collect();
+    if !doubtful.is_empty() {
+        line("abstain", format!("do not rely on {}", shortened(&doubtful)));
+    }
+    let c = &map.choice;
+    let rounds: Vec<String> =
+        c.rounds.iter().filter(|r| r.1 > 0).map(|(why, n)| format!("{n} {why}")).collect();
+    line("pairs", format!("{} of {} registered ({})", count(c.tried), count(c.possible), rounds.join(", ")));
+    let contradicting: Vec<String> = map
+        .edges
+        .iter()
+        .filter(|e| e.verdict == srrf_align::EdgeVerdict::Contradicts)
+        .map(|e| format!("{} to {}", scans.name(e.source), scans.name(e.target)))
+        .collect();
+    if !contradicting.is_empty() {
+        line(
+            "contradict",
+            format!("{} left out: {}", counted(contradicting.len(), "pair"), shortened(&contradicting)),
+        );
+    }
+    if let Some(worst) = &map.worst_loop {
+        let scale = map.residual.unwrap_or(worst.displacement);
+        line(
+            "worst loop",
+            format!(
+                "{:.3}°, {}, of {}",
+                worst.angle_deg,
+                length(worst.displacement.max(scale * 1e-3), 3),
+                counted(worst.edges.len(), "pair")
+            ),
+        );
+    }
+    if let Some(residual) = map.residual {
+        line("residual", format!("{} between matched surfaces, root mean square", length(residual, 3)));
+    }
+    line("time", format!("{seconds:.1} s"));
+    lines.join("\n")
+}
+
+/// The first few of a list.
+fn shortened(names: &[String]) -> String {
+    const SHOWN: usize = 6;
+    let mut text = names.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN {
+        text += &format!(" and {} more", count(names.len() - SHOWN));
+    }
+    text
+}
