@@ -47,10 +47,10 @@ pub fn beliefs(prior: &[f64], loops: &[EdgeLoop]) -> Vec<f64> {
                     if prior[*e] > 0.0 { 1.0 / (1.0 + (-odds).exp()) } else { 0.0 }
                 })
                 .collect();
-            for i in 0..messages.len() {
+            for (i, kept) in messages.iter_mut().enumerate() {
                 let next = message(&incoming, i, *closes);
-                change = change.max((next - messages[i]).abs());
-                messages[i] += (1.0 - DAMPING) * (next - messages[i]);
+                change = change.max((next - *kept).abs());
+                *kept += (1.0 - DAMPING) * (next - *kept);
             }
         }
         if change < 1e-6 {

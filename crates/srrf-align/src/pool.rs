@@ -44,6 +44,9 @@ pub struct TriedPair {
     pub prior: f64,
 }
 
+/// Pairs with their places in a list.
+type Numbered = Vec<(usize, TriedPair)>;
+
 /// All that were tried.
 #[derive(Debug, Default)]
 pub struct PairPool {
@@ -99,7 +102,7 @@ impl PairPool {
         let stars = stars(&todo);
         let mut answers: Vec<Option<TriedPair>> = vec![None; todo.len()];
         for some in stars.chunks(place.at_once.max(1)) {
-            let found: Vec<Vec<(usize, TriedPair)>> =
+            let found: Vec<Numbered> =
                 some.par_iter().map(|star| place.star(star, &todo, &tick)).collect::<Result<_, _>>()?;
             found.into_iter().flatten().for_each(|(at, pair)| answers[at] = Some(pair));
         }
@@ -142,7 +145,7 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Workplace<'_, S, R> {
         (target, places): &(usize, Vec<usize>),
         todo: &[Candidate],
         tick: &(impl Fn() + Sync),
-    ) -> Result<Vec<(usize, TriedPair)>, AlignError<S::Error, R::Error>> {
+    ) -> Result<Numbered, AlignError<S::Error, R::Error>> {
         let read =
             |number: usize| self.scans.cloud(number).map_err(|source| AlignError::Scan { number, source });
         let kept: Vec<Option<PairAnswer>> =

@@ -75,23 +75,23 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
     /// The pairs that are chosen, round by round.
     fn chosen(&mut self) -> Result<Consensus, Failed<S, R>> {
         let n = self.surfaces().len();
-        let guessed = self.guessed();
+        let some_unknown = (0..n).any(|i| self.options.initial.get(i).copied().flatten().is_none());
+        let every = self.options.all_pairs == usize::MAX || (some_unknown && !self.options.sequence);
+        if n <= self.options.all_pairs && every {
+            let pairs = (0..n).flat_map(|b| (0..b).map(move |a| (a, b)));
+            let all = pairs.map(|(a, b)| self.candidate(a, b, PairReason::All)).collect();
+            self.try_pairs(PairReason::All, all)?;
+            return Ok(self.consensus());
+        }
         if self.options.sequence {
             let steps = (1..n).map(|i| self.candidate(i - 1, i, PairReason::Sequence)).collect();
             self.try_pairs(PairReason::Sequence, steps)?;
         }
+        let guessed = self.guessed();
         if !guessed.is_empty() {
             self.try_pairs(PairReason::Guess, guessed)?;
         }
         let begun = !self.pool.tried.is_empty();
-        if n <= self.options.all_pairs && !begun {
-            let all = (0..n)
-                .flat_map(|b| (0..b).map(move |a| (a, b)))
-                .map(|(a, b)| self.candidate(a, b, PairReason::All));
-            let all = all.collect();
-            self.try_pairs(PairReason::All, all)?;
-            return Ok(self.consensus());
-        }
         let mut found = self.consensus();
         if !begun || found.components.len() > 1 {
             (self.place.progress)(AlignProgress { stage: AlignStage::Candidates, done: 0, total: n });

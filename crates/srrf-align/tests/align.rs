@@ -1,5 +1,7 @@
 //! Scans of built-in shapes from all around, registered by an oracle that errs where it is told to.
 
+#![allow(clippy::unwrap_used, reason = "tests")]
+
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::sync::Mutex;

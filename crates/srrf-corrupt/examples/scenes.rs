@@ -129,7 +129,7 @@ fn write(out: &Path, scans: &[(String, PointCloud)], rng: &mut ChaCha8Rng) -> Ou
     writeln!(truth, "# file, station, first three rows of map_from_scan")?;
     for (number, (station, scan)) in scans.iter().enumerate() {
         let size = scan.points().iter().flatten().fold(0.0f64, |most, c| most.max(c.abs()));
-        let angles = std::array::from_fn(|_| rng.random_range(-3.14..3.14));
+        let angles = std::array::from_fn(|_| rng.random_range(-3.0..3.0));
         let scan_from_map: Rigid = anywhere(angles, std::array::from_fn(|_| rng.random_range(-size..size)));
         let name = format!("scan-{number:04}.ply");
         let moved = scan.points().iter().map(|p| scan_from_map.apply(p)).collect();

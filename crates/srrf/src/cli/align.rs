@@ -13,9 +13,10 @@ use srrf_args::words::{count, counted, length};
 use srrf_args::{Failure, Output, files, interrupt};
 
 use super::align_edges::EdgeFile;
+use super::align_initial::{self, Known};
 use super::align_merge::{MergeArgs, merge};
 use super::align_page;
-use super::align_poses::{self, Known};
+use super::align_poses;
 use super::align_scans::ScanFiles;
 use super::common::unusable;
 use super::method::MethodArgs;
@@ -115,10 +116,10 @@ pub fn run(args: &AlignArgs) -> Result<ExitCode, Failure> {
     let begun = Instant::now();
     let out = args.check()?;
     args.common.threads.start()?;
-    let known = args.add.as_deref().map(align_poses::read_result).transpose()?;
+    let known = args.add.as_deref().map(align_initial::read_result).transpose()?;
     let scans = args.open(known.as_ref())?;
     let initial = match (&args.initial, &known) {
-        (Some(path), _) => align_poses::read_initial(path, &scans.names())?,
+        (Some(path), _) => align_initial::read_initial(path, &scans.names())?,
         (None, Some(known)) => known.guesses(scans.len()),
         (None, None) => Vec::new(),
     };

@@ -9,7 +9,6 @@ use std::sync::{Mutex, PoisonError};
 use serde::{Deserialize, Serialize};
 use srrf_align::{PairAnswer, PairStore};
 use srrf_args::{Failure, interrupt};
-use srrf_cloud::Rigid;
 
 use super::align_poses::{matrix, rigid_of};
 use super::align_scans::ScanFiles;
@@ -163,9 +162,8 @@ fn parse(text: &[u8], options: &str) -> Result<BTreeMap<(String, String), PairAn
     Ok(known)
 }
 
-/// For tests of what reads these files.
 #[cfg(test)]
-pub fn line_of(source: &str, target: &str, pose: &Rigid, options: &str) -> String {
+fn line_of(source: &str, target: &str, pose: &srrf_cloud::Rigid, options: &str) -> String {
     let line = EdgeLine {
         source: source.into(),
         target: target.into(),
@@ -181,6 +179,8 @@ pub fn line_of(source: &str, target: &str, pose: &Rigid, options: &str) -> Strin
 
 #[cfg(test)]
 mod tests {
+    use srrf_cloud::Rigid;
+
     use super::*;
 
     #[test]

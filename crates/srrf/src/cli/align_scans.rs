@@ -93,14 +93,6 @@ impl ScanFiles {
         (self.scans[number].points, self.scans[number].dropped)
     }
 
-    /// One with its file, for what else that holds.
-    ///
-    /// # Errors
-    /// As when it was read first.
-    pub fn input(&self, number: usize) -> Result<Input, Failure> {
-        files::read_solid(&self.scans[number].path, None)
-    }
-
     /// How many targets may be ready at once: one a thread, or as many as the rest of the budget takes.
     pub fn at_once(&self, threads: usize) -> usize {
         let Some(budget) = self.budget else { return threads };

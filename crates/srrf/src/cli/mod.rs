@@ -10,6 +10,7 @@ use srrf_corrupt::cli::{CorruptArgs, corrupt};
 
 mod align;
 mod align_edges;
+mod align_initial;
 mod align_merge;
 mod align_page;
 mod align_poses;
