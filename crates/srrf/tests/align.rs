@@ -128,14 +128,14 @@ fn a_folder_of_views_gives_one_map_and_an_added_scan_joins_it() {
 fn two_objects_give_two_maps_and_exit_code_3() {
     let scene = Scene::new(50);
     let (first, second) = (views(&scene, "a", 1, 2), views(&scene, "b", 3, 2));
-    let done = scene.srrf(&["align", "scans", "-o", "poses.json", "--kitti", "k.txt"]);
+    let done = scene.srrf(&["align", "scans", "-o", "poses.json", "--kitti", "k.txt", "--edges", "e.jsonl"]);
     // The poses are written; KITTI cannot hold two maps.
     assert_eq!(done.code, 1, "{done:?}");
     assert!(
         done.err.contains("--kitti holds the poses of one map") && done.err.contains("make 2"),
         "{done:?}"
     );
-    let done = scene.srrf(&["align", "scans", "-o", "poses.json"]);
+    let done = scene.srrf(&["align", "scans", "-o", "poses.json", "--edges", "e.jsonl"]);
     assert_eq!(done.code, 3, "{done:?}");
     assert!(done.out.contains("nothing is known of how they lie to each other"), "{}", done.out);
     let result: Value = serde_json::from_str(&scene.read("poses.json")).unwrap();

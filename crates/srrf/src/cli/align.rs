@@ -20,7 +20,6 @@ use super::align_poses;
 use super::align_scans::ScanFiles;
 use super::common::unusable;
 use super::method::MethodArgs;
-use super::page::PageArgs;
 
 /// The exit code of a map in which not every scan is placed.
 const ABSTAINED: u8 = 3;
@@ -93,9 +92,6 @@ pub struct AlignArgs {
 
     #[command(flatten)]
     method: MethodArgs,
-
-    #[command(flatten)]
-    page: PageArgs,
 
     #[command(flatten)]
     common: Common,
@@ -222,7 +218,7 @@ impl AlignArgs {
             lines.push(wrote(path, &what));
         }
         if let Some(path) = &self.html {
-            files::write(path, align_page::page(map, scans, &self.page)?.as_bytes())?;
+            files::write(path, align_page::page(map, scans)?.as_bytes())?;
             lines.push(wrote(path, "open it in a browser"));
         }
         Ok(lines)

@@ -6,13 +6,12 @@ use srrf_args::words::{counted, length};
 use srrf_view::{MAP_POINTS, MapLink, MapPage, MapScan};
 
 use super::align_scans::ScanFiles;
-use super::page::PageArgs;
 
 /// The page.
 ///
 /// # Errors
 /// [`Failure`] for scans that cannot be read again.
-pub fn page(map: &Map, scans: &ScanFiles, _args: &PageArgs) -> Result<String, Failure> {
+pub fn page(map: &Map, scans: &ScanFiles) -> Result<String, Failure> {
     let each = (MAP_POINTS / map.scans.len().max(1)).max(64);
     let mut shown = Vec::with_capacity(map.scans.len());
     for (number, placed) in map.scans.iter().enumerate() {
