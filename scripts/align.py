@@ -91,7 +91,7 @@ def make_scene(program, kind, out, **numbers):
         words += [f"--{name}", str(value)]
     subprocess.run(words, check=True)
     truth = {}
-    for line in (out / "truth.txt").read_text().splitlines():
+    for line in (out / "truth.poses").read_text().splitlines():
         if not line.startswith("#"):
             name, _station, *row = line.split()
             row = list(map(float, row))

@@ -4,7 +4,7 @@
 //!     scenes building  OUT [--row 12] [--points 20000] [--loose 3] [--noise 0.004] [--seed 1]
 //!     scenes corridor  OUT [--scans 500] [--points 20000] [--seed 1]
 //!
-//! OUT gets `scan-0000.ply` and so on, in an order that says nothing, and `truth.txt`: name, then the first three rows of
+//! OUT gets `scan-0000.ply` and so on, in an order that says nothing, and `truth.poses`: name, then the first three rows of
 //! `map_from_scan`. `corridor` repeats scans of a building until there are enough.
 
 use std::error::Error;
@@ -125,7 +125,7 @@ fn building_scans(
 /// Writes the scans, each moved to anywhere, and the truth.
 fn write(out: &Path, scans: &[(String, PointCloud)], rng: &mut ChaCha8Rng) -> Outcome<()> {
     fs::create_dir_all(out)?;
-    let mut truth = fs::File::create(out.join("truth.txt"))?;
+    let mut truth = fs::File::create(out.join("truth.poses"))?;
     writeln!(truth, "# file, station, first three rows of map_from_scan")?;
     for (number, (station, scan)) in scans.iter().enumerate() {
         let size = scan.points().iter().flatten().fold(0.0f64, |most, c| most.max(c.abs()));

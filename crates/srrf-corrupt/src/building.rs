@@ -27,7 +27,7 @@ struct Pane {
 
 /// Where a scan is taken.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Station {
+pub struct ScanPlace {
     /// Such as `room-07`, `door-07`, `corridor-1-03`.
     pub name: String,
     /// Place of the scanner in the building, metres.
@@ -38,7 +38,7 @@ pub struct Station {
 #[derive(Debug, Clone)]
 pub struct Building {
     panes: Vec<Pane>,
-    stations: Vec<Station>,
+    stations: Vec<ScanPlace>,
 }
 
 impl Building {
@@ -76,7 +76,7 @@ impl Building {
     }
 
     /// The stations: one in each room, one in each door, and along the corridors.
-    pub fn stations(&self) -> &[Station] {
+    pub fn stations(&self) -> &[ScanPlace] {
         &self.stations
     }
 
@@ -194,9 +194,9 @@ impl Building {
         }
         let eye = |v: f64, u: f64| [x + u, far + into * v, EYE];
         let middle = eye(rng.random_range(2.1..3.1), rng.random_range(1.9..2.7));
-        self.stations.push(Station { name: format!("room-{number:02}"), eye: middle });
+        self.stations.push(ScanPlace { name: format!("room-{number:02}"), eye: middle });
         let door = eye(ROOM_DEPTH - rng.random_range(0.05..0.25), left - x + rng.random_range(0.35..0.55));
-        self.stations.push(Station { name: format!("door-{number:02}"), eye: door });
+        self.stations.push(ScanPlace { name: format!("door-{number:02}"), eye: door });
     }
 
     fn corridors(&mut self, x: [f64; 2], y: [f64; 2], a_row: usize, rng: &mut ChaCha8Rng) {
@@ -222,14 +222,14 @@ impl Building {
             for i in 0..=steps {
                 let along = west + 1.2 + i as f64 * STEP + rng.random_range(-0.3..0.3);
                 let eye = [along.min(east + 1.2), base + 1.2 + rng.random_range(-0.3..0.3), EYE];
-                self.stations.push(Station { name: format!("corridor-{row}-{i:02}"), eye });
+                self.stations.push(ScanPlace { name: format!("corridor-{row}-{i:02}"), eye });
             }
         }
         let steps = ((second - first - CORRIDOR) / STEP).floor() as usize;
         for (side, along) in [west + 1.2, east + 1.2].into_iter().enumerate() {
             for i in 0..=steps {
                 let eye = [along, first + CORRIDOR + 1.0 + i as f64 * STEP, EYE];
-                self.stations.push(Station { name: format!("cross-{side}-{i:02}"), eye });
+                self.stations.push(ScanPlace { name: format!("cross-{side}-{i:02}"), eye });
             }
         }
     }
@@ -247,7 +247,7 @@ mod tests {
     #[test]
     fn scans_see_the_walls_around_them_and_rooms_see_out_of_the_door() {
         let building = Building::new(3, 2, 5);
-        let rooms: Vec<&Station> =
+        let rooms: Vec<&ScanPlace> =
             building.stations().iter().filter(|s| s.name.starts_with("room")).collect();
         assert_eq!(rooms.len(), 12);
         for station in building.stations() {

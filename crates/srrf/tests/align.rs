@@ -41,9 +41,9 @@ fn views(scene: &Scene, name: &str, shape: usize, kept: usize) -> Vec<Rigid> {
 fn pose(scan: &Value) -> Rigid {
     let rows: Vec<Vec<f64>> = serde_json::from_value(scan["map_from_scan"].clone()).unwrap();
     let mut pose = Rigid::identity();
-    for r in 0..3 {
-        (0..3).for_each(|c| pose.rotation[(r, c)] = rows[r][c]);
-        pose.translation[r] = rows[r][3];
+    for (r, row) in rows.iter().take(3).enumerate() {
+        (0..3).for_each(|c| pose.rotation[(r, c)] = row[c]);
+        pose.translation[r] = row[3];
     }
     pose
 }

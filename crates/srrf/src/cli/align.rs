@@ -2,18 +2,18 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
-use srrf::Registrar;
+use srrf::{Options, Registrar};
 use srrf_align::{AlignError, AlignOptions, AlignProgress, AlignStage, Map};
 use srrf_args::flags::{Common, value};
 use srrf_args::words::{count, counted, length};
-use srrf_args::{Failure, Output, files, interrupt};
+use srrf_args::{Failure, Output, Progress, files, interrupt};
 
 use super::align_edges::EdgeFile;
-use super::align_initial::{self, Known};
+use super::align_initial::{self, EarlierMap};
 use super::align_merge::{MergeArgs, merge};
 use super::align_page;
 use super::align_poses;
@@ -113,14 +113,19 @@ pub fn run(args: &AlignArgs) -> Result<ExitCode, Failure> {
     let out = args.check()?;
     args.common.threads.start()?;
     let known = args.add.as_deref().map(align_initial::read_result).transpose()?;
+    let progress = args.common.progress();
+    progress.step("reading the scans, loading the network");
     let scans = args.open(known.as_ref())?;
     let initial = match (&args.initial, &known) {
         (Some(path), _) => align_initial::read_initial(path, &scans.names())?,
         (None, Some(known)) => known.guesses(scans.len()),
         (None, None) => Vec::new(),
     };
-    let registrar = Registrar::new(args.method.options()).map_err(unusable)?;
+    // All scans are in one unit; a small scan beside a large one is no sign of another.
+    let registrar =
+        Registrar::new(Options { check_scale: false, ..args.method.options() }).map_err(unusable)?;
     let edges = EdgeFile::open(args.edges.as_deref(), &scans, &registrar.options().to_string())?;
+    progress.clear();
     if edges.known() > 0 {
         out.say(&format!("{} known already", counted(edges.known(), "pair")));
     }
@@ -136,9 +141,9 @@ pub fn run(args: &AlignArgs) -> Result<ExitCode, Failure> {
         at_once: Some(scans.at_once(rayon::current_num_threads())),
         ..AlignOptions::default()
     };
-    let bar = bar(args.common.quiet.quiet);
-    let map = srrf_align::align(&scans, &registrar, &options, &edges, &|p| show(&bar, p));
-    bar.finish_and_clear();
+    let signs = Signs::new(&progress);
+    let map = srrf_align::align(&scans, &registrar, &options, &edges, &|p| signs.show(p));
+    progress.clear();
     let map = map.map_err(|e| failed(e, &scans))?;
     edges.finish()?;
     let seconds = begun.elapsed().as_secs_f64();
@@ -180,8 +185,8 @@ impl AlignArgs {
         Ok(Output::new(self.common.quiet.quiet, streams > 0))
     }
 
-    fn open(&self, known: Option<&Known>) -> Result<ScanFiles, Failure> {
-        let before: Vec<PathBuf> = known.map_or_else(Vec::new, Known::paths);
+    fn open(&self, known: Option<&EarlierMap>) -> Result<ScanFiles, Failure> {
+        let before: Vec<PathBuf> = known.map_or_else(Vec::new, EarlierMap::paths);
         let budget = self.max_memory.map(|gb| gb * 1e9);
         ScanFiles::open(&before, &self.scans, budget)
     }
@@ -247,20 +252,33 @@ fn failed(error: AlignError<Failure, srrf::Error>, scans: &ScanFiles) -> Failure
     }
 }
 
-fn bar(quiet: bool) -> ProgressBar {
-    if quiet {
-        return ProgressBar::hidden();
-    }
-    let style = ProgressStyle::with_template("{msg:18} {wide_bar} {pos}/{len}, {elapsed}");
-    ProgressBar::new(1).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+/// Progress of the alignment as signs of life.
+struct Signs<'a> {
+    progress: &'a Progress,
+    last: Mutex<Option<AlignProgress>>,
 }
 
-fn show(bar: &ProgressBar, progress: AlignProgress) {
-    bar.set_message(progress.stage.to_string());
-    bar.set_length(progress.total as u64);
-    // Threads report out of order.
-    if progress.stage != AlignStage::Pairs || progress.done as u64 > bar.position() {
-        bar.set_position(progress.done as u64);
+impl<'a> Signs<'a> {
+    fn new(progress: &'a Progress) -> Self {
+        Self { progress, last: Mutex::new(None) }
+    }
+
+    fn show(&self, now: AlignProgress) {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = last.filter(|l| l.stage == now.stage && l.total == now.total);
+        if same.is_none() {
+            match now.stage {
+                AlignStage::Read => self.progress.counted(now.stage.to_string(), now.total, "scans"),
+                AlignStage::Pairs => self.progress.counted(now.stage.to_string(), now.total, "pairs"),
+                AlignStage::Candidates | AlignStage::Graph | AlignStage::Joint => {
+                    self.progress.step(now.stage.to_string());
+                }
+            }
+        }
+        let before = same.map_or(0, |l| l.done);
+        // Threads report out of order.
+        self.progress.advance(now.done.saturating_sub(before));
+        *last = Some(AlignProgress { done: now.done.max(before), ..now });
     }
 }
 
@@ -325,6 +343,12 @@ fn summary(map: &Map, scans: &ScanFiles, seconds: f64) -> String {
         line("residual", format!("{} between matched surfaces, root mean square", length(residual, 3)));
     }
     line("time", format!("{seconds:.1} s"));
+    if let Some((small, large, factor)) = scans.far_apart() {
+        line(
+            "warning",
+            format!("{large} is {factor:.0} times as large as {small}: are all scans in one unit?"),
+        );
+    }
     lines.join("\n")
 }
 

@@ -11,18 +11,18 @@ use super::align_poses::{SCHEMA, SCHEMA_VERSION, rigid_of};
 
 /// An earlier result.
 #[derive(Debug, Deserialize)]
-pub struct Known {
+pub struct EarlierMap {
     schema: String,
     schema_version: u64,
     /// Its scans.
-    pub scans: Vec<KnownScan>,
+    pub scans: Vec<EarlierScan>,
     #[serde(skip)]
     folder: PathBuf,
 }
 
 /// A scan of an earlier result.
 #[derive(Debug, Deserialize)]
-pub struct KnownScan {
+pub struct EarlierScan {
     name: String,
     component: usize,
     map_from_scan: [[f64; 4]; 4],
@@ -32,7 +32,7 @@ pub struct KnownScan {
 ///
 /// # Errors
 /// [`Failure::usage`], which names the file and what is wrong with it.
-pub fn read_result(path: &Path) -> Result<Known, Failure> {
+pub fn read_result(path: &Path) -> Result<EarlierMap, Failure> {
     let text = std::fs::read_to_string(path).map_err(|e| {
         Failure::usage(format!("cannot read {path:?}: {e}; it should be what --output wrote"))
     })?;
@@ -41,8 +41,8 @@ pub fn read_result(path: &Path) -> Result<Known, Failure> {
     Ok(known)
 }
 
-fn known_of(text: &str) -> Result<Known, String> {
-    let known: Known =
+fn known_of(text: &str) -> Result<EarlierMap, String> {
+    let known: EarlierMap =
         serde_json::from_str(text).map_err(|e| format!("it is not what --output wrote: {e}"))?;
     if known.schema != SCHEMA || known.schema_version != SCHEMA_VERSION {
         return Err(format!(
@@ -58,7 +58,7 @@ fn known_of(text: &str) -> Result<Known, String> {
     Ok(known)
 }
 
-impl Known {
+impl EarlierMap {
     /// The files of the scans: as written, or beside the result where they are not there.
     pub fn paths(&self) -> Vec<PathBuf> {
         self.scans

@@ -55,7 +55,7 @@ fn is_ply(path: &Path) -> bool {
 }
 
 /// The point of a voxel that is nearest to its middle.
-struct Kept {
+struct VoxelPoint {
     scan: u32,
     point: [f64; 3],
     squared: f64,
@@ -71,7 +71,7 @@ pub fn merge(map: &Map, scans: &ScanFiles, args: &MergeArgs, path: &Path) -> Res
         Some(size) => size,
         None => spacing(members, scans)?,
     };
-    let mut voxels: HashMap<[i64; 3], Kept> = HashMap::new();
+    let mut voxels: HashMap<[i64; 3], VoxelPoint> = HashMap::new();
     let mut total = 0;
     for &number in members {
         let cloud = scans.cloud(number)?;
@@ -81,14 +81,14 @@ pub fn merge(map: &Map, scans: &ScanFiles, args: &MergeArgs, path: &Path) -> Res
             keep(&mut voxels, number, pose.apply(p), size)?;
         }
     }
-    let mut kept: Vec<([i64; 3], Kept)> = voxels.into_iter().collect();
+    let mut kept: Vec<([i64; 3], VoxelPoint)> = voxels.into_iter().collect();
     kept.sort_unstable_by_key(|(key, k)| (k.scan, *key));
     files::write(path, &ply(&kept))?;
     Ok((kept.len(), total))
 }
 
 fn keep(
-    voxels: &mut HashMap<[i64; 3], Kept>,
+    voxels: &mut HashMap<[i64; 3], VoxelPoint>,
     number: usize,
     point: [f64; 3],
     size: f64,
@@ -100,7 +100,7 @@ fn keep(
     }
     let key = point.map(|c| (c / size).floor() as i64);
     let squared = (0..3).map(|c| (point[c] - (key[c] as f64 + 0.5) * size).powi(2)).sum();
-    let next = Kept { scan: u32::try_from(number).unwrap_or(u32::MAX), point, squared };
+    let next = VoxelPoint { scan: u32::try_from(number).unwrap_or(u32::MAX), point, squared };
     match voxels.entry(key) {
         std::collections::hash_map::Entry::Vacant(free) => {
             free.insert(next);
@@ -127,7 +127,7 @@ fn spacing(members: &[usize], scans: &ScanFiles) -> Result<f64, Failure> {
     Ok(all.get(all.len() / 2).copied().filter(|s| *s > 0.0).unwrap_or(f64::MIN_POSITIVE.sqrt()))
 }
 
-fn ply(kept: &[([i64; 3], Kept)]) -> Vec<u8> {
+fn ply(kept: &[([i64; 3], VoxelPoint)]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(200 + 28 * kept.len());
     // Writing to memory cannot fail.
     let _ = write!(

@@ -16,6 +16,9 @@ const POINT: f64 = 24.0;
 /// Bytes that a target takes that is made ready, besides its points three times over.
 const READY: f64 = 60e6;
 
+/// Scans in two units differ by so much at least: a metre has 39 inches.
+const OTHER_UNIT: f64 = 25.0;
+
 /// Scans by number.
 #[derive(Debug)]
 pub struct ScanFiles {
@@ -29,6 +32,8 @@ struct OneScan {
     hash: String,
     points: usize,
     dropped: usize,
+    /// Largest distance from the middle of the box.
+    size: f64,
     /// None where it is read again each time.
     cloud: Option<PointCloud>,
 }
@@ -93,6 +98,15 @@ impl ScanFiles {
         (self.scans[number].points, self.scans[number].dropped)
     }
 
+    /// The smallest and the largest scan, and the factor between them, where it is that of a change of units.
+    pub fn far_apart(&self) -> Option<(String, String, f64)> {
+        let order = |a: &&OneScan, b: &&OneScan| a.size.total_cmp(&b.size);
+        let (small, large) = (self.scans.iter().min_by(order)?, self.scans.iter().max_by(order)?);
+        let factor = large.size / small.size;
+        let name = |scan: &OneScan| scan.path.display().to_string();
+        (factor > OTHER_UNIT).then(|| (name(small), name(large), factor))
+    }
+
     /// How many targets may be ready at once: one a thread, or as many as the rest of the budget takes.
     pub fn at_once(&self, threads: usize) -> usize {
         let Some(budget) = self.budget else { return threads };
@@ -133,13 +147,11 @@ impl Scans for ScanFiles {
 
 fn read(path: &Path) -> Result<OneScan, Failure> {
     let Input { cloud, dropped, .. } = files::read_solid(path, None)?;
-    Ok(OneScan {
-        path: path.to_owned(),
-        hash: hash_of(&cloud),
-        points: cloud.len(),
-        dropped,
-        cloud: Some(cloud),
-    })
+    let middle = cloud.middle();
+    let size =
+        cloud.points().iter().map(|p| (nalgebra::Vector3::from(*p) - middle).norm()).fold(0.0, f64::max);
+    let hash = hash_of(&cloud);
+    Ok(OneScan { path: path.to_owned(), hash, points: cloud.len(), dropped, size, cloud: Some(cloud) })
 }
 
 /// The first 16 bytes of the SHA-256 of the coordinates, in hexadecimal.
@@ -208,6 +220,20 @@ mod tests {
         let empty = tempfile::tempdir().unwrap();
         let error = ScanFiles::open(&[], &[empty.path().to_owned()], None).unwrap_err().to_string();
         assert!(error.contains("holds no file"), "{error}");
+    }
+
+    #[test]
+    fn scans_in_two_units_are_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let paths = [1.0, 2.0, 40.0].map(|factor| {
+            let path = folder.path().join(format!("{factor}.ply"));
+            let points = cloud(9).points().iter().map(|p| p.map(|c| factor * c)).collect();
+            write_cloud(&path, &PointCloud::new(points).unwrap()).unwrap();
+            path
+        });
+        assert_eq!(ScanFiles::open(&[], &paths[..2], None).unwrap().far_apart(), None);
+        let (small, large, factor) = ScanFiles::open(&[], &paths, None).unwrap().far_apart().unwrap();
+        assert!(small.ends_with("1.ply") && large.ends_with("40.ply") && (factor - 40.0).abs() < 1e-9);
     }
 
     #[test]
