@@ -122,7 +122,7 @@ class Result:
         return moved
 
     def to_html(
-        self, source: Cloud | None = None, target: Cloud | None = None, *, unit: str = "", up: str = "z"
+        self, source: Cloud | None = None, target: Cloud | None = None, *, unit: str = "", up: str | None = None
     ) -> str:
         """A page with a picture that turns, for any browser.
 
@@ -130,7 +130,7 @@ class Result:
             source: the source again, for results that were pickled.
             target: the target again.
             unit: unit of the coordinates, such as ``"m"``.
-            up: the axis that points up, ``"z"`` or ``"y"``.
+            up: the axis that points up, such as ``"z"`` or ``"-y"``; None guesses it from the target.
 
         Raises:
             InputError: where the clouds are not known any more.

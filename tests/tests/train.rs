@@ -227,10 +227,61 @@ fn a_restart_that_cannot_begin_harms_nothing() {
     for file in ["last.safetensors", "metrics.jsonl", "config.toml"] {
         assert!(folder.join(file).exists(), "{file}");
     }
+    // One without a step has nothing to put in its place.
+    for no_time in [["--until-step", "0"], ["--minutes", "0"]] {
+        let arguments = [&["--config", CONFIG, "--run", path, "--restart"][..], &no_time].concat();
+        let (code, said) = run("srrf-train", &arguments);
+        assert!(code == 0 && said.contains("no step was done"), "{code}: {said}");
+        assert!(parameters(&folder) == before);
+        assert!(folder.join("last.safetensors").exists() && !folder.join("before-restart").exists());
+    }
     // One that begins replaces it, and leaves nothing behind.
     train(&folder, &["--until-step", "1", "--restart"]);
     assert!(parameters(&folder) != before);
     assert!(!folder.join("before-restart").exists());
+}
+
+/// A run may be started from the configuration that it left, but not write what else it reads.
+#[test]
+fn a_run_writes_nothing_that_it_reads() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path().join("run");
+    train(&folder, &["--until-step", "1"]);
+    let resolved = folder.join("config.toml");
+    let [path, config] = [&folder, &resolved].map(|path| path.to_str().unwrap());
+    let again = ["--config", config, "--run", path, "--resume", "--until-step", "2"];
+    assert_eq!(run("srrf-train", &again).0, 0);
+    let text = std::fs::read_to_string(&resolved).unwrap();
+    std::fs::write(&resolved, format!("# mine\n{text}")).unwrap();
+    refuses("srrf-train", &again, &["config.toml", "the configuration", "would be lost"]);
+    assert!(std::fs::read_to_string(&resolved).unwrap().starts_with("# mine"));
+    let start = format!("start = \"{path}/last.safetensors\"\n{text}");
+    let other = scratch.path().join("other.toml");
+    std::fs::write(&other, start).unwrap();
+    let arguments = ["--config", other.to_str().unwrap(), "--run", path, "--restart"];
+    refuses("srrf-train", &arguments, &["last.safetensors", "`start`", "would be lost"]);
+}
+
+/// Any bit that turned over in a checkpoint is noticed.
+#[test]
+fn a_damaged_checkpoint_is_not_used() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path().join("run");
+    train(&folder, &["--until-step", "1"]);
+    let file = folder.join("checkpoint.safetensors");
+    let whole = std::fs::read(&file).unwrap();
+    let header = 8 + u64::from_le_bytes(whole[..8].try_into().unwrap()) as usize;
+    let progress = whole.windows(8).position(|w| w == b"\\\"step\\\"").unwrap() + 9;
+    assert_eq!(whole[progress], b'1');
+    for at in [progress, header, header + (whole.len() - header) / 3, whole.len() - 1] {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 2; // step 1 becomes step 3
+        std::fs::write(&file, damaged).unwrap();
+        let arguments = ["--config", CONFIG, "--run", folder.to_str().unwrap(), "--resume"];
+        refuses("srrf-train", &arguments, &["checkpoint.safetensors", "not a usable checkpoint"]);
+    }
+    std::fs::write(&file, whole).unwrap();
+    train(&folder, &["--resume", "--until-step", "2"]);
 }
 
 #[test]

@@ -4,9 +4,7 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use srrf_cloud::io::{
-    CloudFile, IoError, Kept, is_cloud_file, write_atomically, write_cloud, write_cloud_to,
-};
+use srrf_cloud::io::{CloudFile, IoError, Kept, write_atomically, write_cloud, write_cloud_to};
 use srrf_cloud::{CloudError, PointCloud, Rigid, Solid};
 
 use crate::failure::Failure;
@@ -99,24 +97,9 @@ pub fn check_output(path: &Path) -> Result<(), Failure> {
     })
 }
 
-/// As [`check_output`], for a cloud, whose extension says the format.
-///
-/// # Errors
-/// As [`check_output`]; [`Failure::usage`] for an extension of no known format.
-pub fn check_cloud_output(path: &Path) -> Result<(), Failure> {
-    check_output(path)?;
-    if is_stream(path) || is_special(path) || is_cloud_file(path) {
-        return Ok(());
-    }
-    Err(Failure::usage(format!(
-        "cannot write {path:?}: its extension names no format of clouds that this build has; use one of {}",
-        srrf_cloud::io::format_names().join(", ")
-    )))
-}
-
 /// Whether there is something at `path` that must not be replaced by a file, such as `/dev/null`.
-fn is_special(path: &Path) -> bool {
-    path.metadata().is_ok_and(|m| !m.is_file())
+pub fn is_special(path: &Path) -> bool {
+    path.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
 /// Writes a result, whole or not at all.
@@ -189,8 +172,6 @@ mod tests {
         assert!(error.contains("it is a folder"), "{error}");
         let error = check_output(&folder.path().join("none/a.txt")).unwrap_err().to_string();
         assert!(error.contains("does not exist; create it first"), "{error}");
-        let error = check_cloud_output(&folder.path().join("a.doc")).unwrap_err().to_string();
-        assert!(error.contains("ply") && error.contains("a.doc"), "{error}");
     }
 
     #[cfg(unix)]
@@ -200,7 +181,7 @@ mod tests {
         write(null, b"x").unwrap();
         assert!(is_special(null));
         let cloud = PointCloud::new(vec![[1.0; 3]]).unwrap();
-        check_cloud_output(null).unwrap();
+        check_output(null).unwrap();
         write_points(null, &cloud).unwrap();
         assert!(is_special(null));
     }

@@ -1,6 +1,8 @@
 //! Ctrl-C: the program ends at once with exit code 130, but not in the middle of a write.
 
+use std::fs::remove_file;
 use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::failure::Failure;
@@ -9,6 +11,19 @@ use crate::failure::Failure;
 static WRITING: Mutex<()> = Mutex::new(());
 /// What to say when interrupted.
 static ADVICE: Mutex<&str> = Mutex::new("");
+
+/// Files that must not stay when the process is interrupted.
+static LEFT: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// An interruption removes this file.
+pub(crate) fn removes(path: PathBuf) {
+    LEFT.lock().unwrap_or_else(PoisonError::into_inner).push(path);
+}
+
+/// An interruption does not remove this file any more.
+pub(crate) fn keeps(path: &Path) {
+    LEFT.lock().unwrap_or_else(PoisonError::into_inner).retain(|left| left != path);
+}
 
 /// While the guard lives, an interruption waits.
 pub fn hold() -> MutexGuard<'static, ()> {
@@ -29,6 +44,10 @@ pub fn install() -> Result<(), Failure> {
         let _guard = hold();
         let advice = *ADVICE.lock().unwrap_or_else(PoisonError::into_inner);
         let _ = writeln!(std::io::stderr(), "\ninterrupted{advice}");
+        LEFT.lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .drain(..)
+            .for_each(|path| drop(remove_file(path)));
         std::process::exit(i32::from(crate::INTERRUPTED));
     })
     .map_err(|e| Failure::failed(format!("cannot listen for Ctrl-C: {e}")).because(e))

@@ -7,6 +7,8 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::failure::Failure;
+use crate::output;
+use crate::words::visible;
 
 /// Parses the arguments of the process, does what they ask for, and turns a failure into a message on standard error
 /// and an exit code. Help and version end with 0, arguments that cannot be parsed with 2.
@@ -30,18 +32,28 @@ fn run_on<A: Parser>(
     let arguments = match A::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
-            // A reader that has gone away is no failure.
-            let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { crate::USAGE } else { 0 });
+            let printed = error.print();
+            if error.use_stderr() {
+                return ExitCode::from(crate::USAGE);
+            }
+            output::note(printed);
+            return said(errors).unwrap_or(ExitCode::SUCCESS);
         }
     };
     match work(arguments) {
-        Ok(code) => code,
+        Ok(code) => said(errors).unwrap_or(code),
         Err(failure) => {
-            let _ = writeln!(errors, "error: {failure}");
+            let _ = writeln!(errors, "error: {}", visible(&failure.to_string()));
             failure.exit_code()
         }
     }
+}
+
+/// The exit code where a line on standard output was lost, for another reason than that nobody reads it.
+fn said(errors: &mut dyn Write) -> Option<ExitCode> {
+    let error = output::lost()?;
+    let _ = writeln!(errors, "error: cannot write to standard output: {error}; choose another place for it");
+    Some(ExitCode::from(crate::FAILED))
 }
 
 #[cfg(test)]
@@ -69,5 +81,10 @@ mod tests {
         assert_eq!(run(&["p"]), (ExitCode::from(1), "error: it rains\n".to_owned()));
         assert_eq!(run(&["p", "--bad"]).0, ExitCode::from(2));
         assert_eq!(run(&["p", "--help"]).0, ExitCode::SUCCESS);
+        output::note(Err(std::io::ErrorKind::BrokenPipe.into()));
+        assert_eq!(run(&["p", "--good"]), (ExitCode::SUCCESS, String::new()), "as `head` does");
+        output::note(Err(std::io::ErrorKind::StorageFull.into()));
+        let (code, said) = run(&["p", "--good"]);
+        assert!(code == ExitCode::from(1) && said.contains("cannot write to standard output"), "{said}");
     }
 }

@@ -1,5 +1,28 @@
 //! Words that the programs share: figures, lengths, counts.
 
+use std::borrow::Cow;
+use std::fmt::Write;
+
+/// Text with its control characters written out, such as `\u{1b}` for one that would command a terminal; also those that
+/// turn the direction of reading. Ends of lines and tabs stay.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    let turns = |c: char| matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let hidden = |c: char| (c.is_control() && c != '\n' && c != '\t') || turns(c);
+    if !text.contains(hidden) {
+        return Cow::Borrowed(text);
+    }
+    let mut plain = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if hidden(c) {
+            // Writing to a string cannot fail.
+            let _ = write!(plain, "{}", c.escape_unicode());
+        } else {
+            plain.push(c);
+        }
+    }
+    Cow::Owned(plain)
+}
+
 /// `1,234,567`.
 pub fn count(n: usize) -> String {
     grouped(&n.to_string())
@@ -55,6 +78,15 @@ pub fn vector(v: [f64; 3], scale: f64, digits: i32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_commands_a_terminal() {
+        assert_eq!(visible("a\tb\nµ 1"), "a\tb\nµ 1");
+        assert_eq!(
+            visible("\u{1b}[2Jred\r\u{7}\u{9b}\u{202e}x"),
+            "\\u{1b}[2Jred\\u{d}\\u{7}\\u{9b}\\u{202e}x"
+        );
+    }
 
     #[test]
     fn figures() {

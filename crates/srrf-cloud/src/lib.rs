@@ -14,6 +14,7 @@ pub mod io;
 mod mesh;
 mod neighbours;
 mod normals;
+pub mod pose;
 pub mod profile;
 mod register;
 mod right;

@@ -1,8 +1,8 @@
 //! [`Cache`]: answers that were computed before, so that a run goes on after a kill and a second run
 //! of the same command computes nothing.
 //!
-//! One file, `answers.jsonl`, to which a line is appended for each answer: the key, a space, the
-//! answer as JSON. A key is a hash of all that an answer depends on: the code of the methods, the
+//! One file, `answers.jsonl`, to which a line is appended for each answer: the key, a checksum, the
+//! answer as JSON, with spaces between. An answer whose checksum is another one is computed anew. A key is a hash of all that an answer depends on: the code of the methods, the
 //! device, the method with its weights and settings, the two clouds and the true pose. A line that a
 //! kill tore is ignored, and so is one that another version wrote.
 
@@ -20,11 +20,14 @@ use crate::kept::KeptAnswer;
 use crate::methods::ReadyMethod;
 
 /// Changes with the meaning of keys and lines.
-const FORMAT: &str = "srrf-eval answers 1";
+const FORMAT: &str = "srrf-eval answers 2";
 /// Name of the file in the folder.
 const FILE: &str = "answers.jsonl";
 /// Hexadecimal digits of a key: 128 bits.
 const KEY_DIGITS: usize = 32;
+
+/// Hexadecimal digits of the checksum of an answer: 32 bits of its SHA-256.
+const SUM_DIGITS: usize = 8;
 
 /// Names an answer.
 type Key = [u8; KEY_DIGITS / 2];
@@ -91,7 +94,11 @@ impl Cache {
         let mut json = vec![0; length];
         lines.file.seek(SeekFrom::Start(start)).ok()?;
         lines.file.read_exact(&mut json).ok()?;
-        let found = serde_json::from_slice(&json).ok()?;
+        let (sum, json) = json.split_at_checked(SUM_DIGITS + 1)?;
+        if sum.trim_ascii_end() != checksum(json).as_bytes() {
+            return None;
+        }
+        let found = serde_json::from_slice(json).ok()?;
         lines.reused += 1;
         Some(found)
     }
@@ -108,6 +115,7 @@ impl Cache {
     ) -> Result<(), EvalError> {
         let key = self.key(method, pair);
         let written = serde_json::to_string(found).map_err(io::Error::from).and_then(|json| {
+            let json = format!("{} {json}", checksum(json.as_bytes()));
             let line = format!("{} {json}\n", hex(&key));
             let mut lines = self.lock();
             // One call, so that a line of another process cannot get into this one.
@@ -170,6 +178,10 @@ fn open(folder: &Path, path: &Path) -> io::Result<KeptLines> {
         }
     }
     Ok(KeptLines { file, index, reused: 0 })
+}
+
+fn checksum(json: &[u8]) -> String {
+    Sha256::digest(json).iter().take(SUM_DIGITS / 2).map(|byte| format!("{byte:02x}")).collect()
 }
 
 fn hex(key: &Key) -> String {

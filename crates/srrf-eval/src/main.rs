@@ -1,11 +1,11 @@
 //! `srrf-eval`: scores registration methods on clean and corrupted pairs.
 
-use std::io::{self, Write};
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use srrf_args::{interrupt, run_program};
+use srrf_args::words::visible;
+use srrf_args::{Output, OutputLock, interrupt, run_program};
 use srrf_cloud::profile;
 use srrf_eval::tables::{self, TablesProgress};
 use srrf_eval::{
@@ -21,9 +21,15 @@ fn main() -> ExitCode {
             Some(EvalCommand::Scripts(scripts)) => return scripts.run(srrf_eval::command()),
             Some(EvalCommand::Tables(tables)) => {
                 interrupt::advise("; the same command goes on where this one stopped");
+                tables.check_places()?;
+                report::prepare(&tables.out)?;
+                let _lock = OutputLock::take(&tables.out.join("report"))?;
                 make_tables(tables)?;
             }
-            None => run(&options)?,
+            None => {
+                options.check_places()?;
+                run(&options)?;
+            }
         }
         Ok(ExitCode::SUCCESS)
     })
@@ -79,7 +85,7 @@ fn run(options: &EvalOptions) -> Result<(), EvalError> {
     let mut tenths = 0;
     let outcome = run.execute(&mut |done, group| {
         bar.inc(done as u64);
-        bar.set_message(group.to_owned());
+        bar.set_message(visible(group).into_owned());
         // Where there is no terminal, a line after each tenth.
         let now = 10 * bar.position() / bar.length().unwrap_or(1).max(1);
         if bar.is_hidden() && now > tenths {
@@ -135,7 +141,7 @@ fn make_tables(options: &TablesOptions) -> Result<(), EvalError> {
         }
         TablesProgress::Done(pairs, group) => {
             bar.inc(pairs as u64);
-            bar.set_message(group.to_owned());
+            bar.set_message(visible(group).into_owned());
         }
     })?;
     bar.finish_and_clear();
@@ -166,5 +172,5 @@ fn bar_style() -> ProgressStyle {
 
 /// A line on standard output; a closed pipe is no reason to stop before the report is written.
 fn say(line: &str) {
-    let _ = writeln!(io::stdout(), "{line}");
+    Output::Standard.say(line);
 }

@@ -26,6 +26,7 @@ pub mod ops;
 mod pfi;
 mod prior;
 mod procrustes;
+pub mod ranges;
 mod register;
 mod sem;
 mod sfe;

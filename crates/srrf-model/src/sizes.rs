@@ -4,15 +4,19 @@ use std::fmt::Debug;
 
 use burn::module::Module;
 use burn::tensor::Device;
+use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::branch::BranchConfig;
+use crate::ranges::out_of_range;
 use crate::sem::SemConfig;
 use crate::srrf::{Srrf, SrrfConfig};
 
 /// The sizes of a network: what it is built from, and what stands beside its weights.
-pub trait NetworkConfig: Clone + Debug + PartialEq + Serialize + DeserializeOwned + Send + Sync {
+pub trait NetworkConfig:
+    Clone + Debug + PartialEq + Serialize + DeserializeOwned + JsonSchema + Send + Sync
+{
     /// The network.
     type Network: Module + Send + Sync;
     /// Key of the sizes in the header of a weights file.
@@ -23,6 +27,18 @@ pub trait NetworkConfig: Clone + Debug + PartialEq + Serialize + DeserializeOwne
     /// # Errors
     /// [`WrongSize`] for the first one that cannot be.
     fn check(&self) -> Result<(), WrongSize>;
+
+    /// Checks that every number is in its range, before anything is built with it; then as [`NetworkConfig::check`].
+    ///
+    /// # Errors
+    /// [`WrongSize`] for the first one that is not.
+    fn check_ranges(&self) -> Result<(), WrongSize> {
+        let value = toml::Value::try_from(self).map_err(|e| WrongSize::new("(all)", e.to_string()))?;
+        match out_of_range(&schema_for!(Self), &value) {
+            Some((key, why)) => Err(WrongSize { key, why }),
+            None => self.check(),
+        }
+    }
 
     /// A new network; see [`crate::init::seeded`] for weights that do not depend on the backend.
     fn init(&self, device: &Device) -> Self::Network;

@@ -11,16 +11,25 @@ use crate::refusal::{Fault, Refusal};
 
 /// A page for any browser: both clouds, the pose, and the figures of an answer in JSON.
 #[pyfunction]
-pub fn page(answer: &str, source: &Cloud, target: &Cloud, unit: &str, up: &str) -> Result<String, Refusal> {
+pub fn page(
+    answer: &str,
+    source: &Cloud,
+    target: &Cloud,
+    unit: &str,
+    up: Option<&str>,
+) -> Result<String, Refusal> {
     let value: Value = serde_json::from_str(answer)
         .map_err(|e| Refusal::new(Fault::Internal, format!("an answer that cannot be read: {e}")))?;
-    let up = match up {
-        "z" => Up::Z,
-        "y" => Up::Y,
-        _ => return Err(Refusal::new(Fault::Option, format!("up is `{up}`: use z or y"))),
+    let axis = |name: &str| {
+        let known = Up::ALL.into_iter().find(|up| up.name() == name);
+        known.ok_or_else(|| Refusal::new(Fault::Option, format!("up is `{name}`: use z, y, x, -z, -y or -x")))
     };
+    let up = up.map(axis).transpose()?;
     let title = format!("{} to {}", source.name, target.name);
-    let mut pair = Pair::new(&*title, &source.points, &target.points).unit(unit).up(up);
+    let mut pair = Pair::new(&*title, &source.points, &target.points).unit(unit);
+    if let Some(up) = up {
+        pair = pair.up(up);
+    }
     if let Some(pose) = pose(&value["target_from_source"]) {
         pair = pair.pose(Pose::new("result", pose));
     }

@@ -1,7 +1,7 @@
 //! Checkpoints: parameters, optimiser and position in one file, written aside and renamed, so that
 //! a run that is killed at any moment goes on from the last one with the same result.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use burn::module::Module;
@@ -9,14 +9,17 @@ use burn::optim::ModuleOptimizer;
 use burn::tensor::{Bytes, Device};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 use srrf_model::init;
-use srrf_model::weights::{WeightsError, parameters, with_parameters, write_atomically};
+use srrf_model::weights::{WeightsError, parameters, serialize, with_parameters, write_atomically};
 
 use crate::config::TrainConfig;
 use crate::seam::Trained;
 
 /// How the optimiser's state is laid out: by rows of parts (`crate::rows`).
 const FORMAT: &str = "rows-1";
+/// Header entry of the checksum.
+const SUM: &str = "sha256";
 /// Name of the checkpoint in the run's folder.
 pub const FILE: &str = "checkpoint.safetensors";
 
@@ -112,20 +115,41 @@ pub fn save<C: Trained>(
     tensors.push(("optimizer".into(), Dtype::U8, vec![state.len()], state.to_vec()));
     let views = tensors
         .iter()
-        .map(|(name, dtype, shape, bytes)| {
-            Ok((name.as_str(), TensorView::new(*dtype, shape.clone(), bytes)?))
-        })
+        .map(|(name, dtype, shape, bytes)| Ok((name.clone(), TensorView::new(*dtype, shape.clone(), bytes)?)))
         .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()
         .map_err(|e| broken(e.to_string()))?;
     let json = |value: Result<String, serde_json::Error>| value.map_err(|e| broken(e.to_string()));
-    let header = HashMap::from([
+    let mut header = BTreeMap::from([
         ("progress".to_string(), json(serde_json::to_string(progress))?),
         ("config".to_string(), json(serde_json::to_string(config))?),
         ("format".to_string(), FORMAT.to_string()),
     ]);
-    let bytes = safetensors::serialize(views, Some(header)).map_err(|e| broken(e.to_string()))?;
+    let sum = checksum(
+        tensors.iter().map(|(name, _, _, bytes)| (name.as_str(), bytes.as_slice())),
+        header.iter().map(|(key, text)| (key.as_str(), text.as_str())),
+    );
+    header.insert(SUM.to_string(), sum);
+    let bytes = serialize(views, &header).map_err(|e| broken(e.to_string()))?;
     write_atomically(&path, &bytes)?;
     Ok(())
+}
+
+/// SHA-256 over the names and bytes of tensors and of header entries, but for the checksum itself, in the order of the names.
+fn checksum<'a>(
+    tensors: impl Iterator<Item = (&'a str, &'a [u8])>,
+    entries: impl Iterator<Item = (&'a str, &'a str)>,
+) -> String {
+    let tensors: BTreeMap<&str, &[u8]> = tensors.collect();
+    let entries: BTreeMap<&str, &[u8]> =
+        entries.filter(|(key, _)| *key != SUM).map(|(key, text)| (key, text.as_bytes())).collect();
+    let mut hash = Sha256::new();
+    for (name, bytes) in tensors.into_iter().chain(entries) {
+        hash.update((name.len() as u64).to_le_bytes());
+        hash.update(name.as_bytes());
+        hash.update((bytes.len() as u64).to_le_bytes());
+        hash.update(bytes);
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Reads the checkpoint of `folder`, if there is one.
@@ -159,9 +183,20 @@ pub fn load<C: Trained>(
         return Err(CheckpointError::OtherConfig { path, why: format!("`{key}` differs") });
     }
 
+    let tensors = SafeTensors::deserialize(&bytes).map_err(|e| broken(e.to_string()))?.tensors();
+    // Checkpoints of version 0.1.0 have none.
+    if let Some(sum) = header.get(SUM)
+        && *sum
+            != checksum(
+                tensors.iter().map(|(name, view)| (name.as_str(), view.data())),
+                header.iter().map(|(key, text)| (key.as_str(), text.as_str())),
+            )
+    {
+        return Err(broken("its checksum is another one, so that it is damaged".into()));
+    }
     let mut values = BTreeMap::new();
     let mut state = None;
-    for (name, view) in SafeTensors::deserialize(&bytes).map_err(|e| broken(e.to_string()))?.tensors() {
+    for (name, view) in tensors {
         if let Some(name) = name.strip_prefix("model.") {
             let data =
                 view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();

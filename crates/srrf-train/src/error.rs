@@ -16,6 +16,9 @@ pub enum TrainError {
     /// The configuration cannot be used.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// The run would write a file that it reads.
+    #[error(transparent)]
+    Places(Box<srrf_args::Failure>),
     /// The configuration trains what nobody knows.
     #[error("{path}: `method` is \"{method}\"; choose from {known}")]
     Method {
@@ -131,6 +134,7 @@ impl TrainError {
     pub fn is_bad_input(&self) -> bool {
         match self {
             Self::Config(_)
+            | Self::Places(_)
             | Self::Method { .. }
             | Self::Device(_)
             | Self::Shapes(_)

@@ -67,17 +67,28 @@ impl RunFolder {
             }
         }
         let folder = Self { path: path.into(), _lock: file };
-        let aside = folder.path.join(ASIDE);
-        if aside.is_dir() {
+        if folder.path.join(ASIDE).is_dir() {
             match folder.path.join(checkpoint::FILE).exists() {
                 true => folder.forget()?,
-                false => {
-                    folder.clear_restarted(&aside).map_err(io(path))?;
-                    folder.move_files(&aside, &folder.path).map_err(io(path))?;
-                }
+                false => folder.bring_back()?,
             }
         }
         Ok(folder)
+    }
+
+    /// Whether a run with a checkpoint waits aside for the first checkpoint of the one that is to replace it.
+    pub(crate) fn replaces_a_run(&self) -> bool {
+        self.path.join(ASIDE).join(checkpoint::FILE).exists() && !self.path.join(checkpoint::FILE).exists()
+    }
+
+    /// Brings the run back that was moved aside, with nothing of the one that was to replace it.
+    ///
+    /// # Errors
+    /// [`TrainError::Io`].
+    pub(crate) fn bring_back(&self) -> Result<(), TrainError> {
+        let aside = self.path.join(ASIDE);
+        let back = self.clear_restarted(&aside).and_then(|()| self.move_files(&aside, &self.path));
+        back.map_err(|source| TrainError::Io { path: self.path.clone(), source })
     }
 
     /// Moves what the folder holds of a run aside; [`RunFolder::forget`] removes it.

@@ -1,13 +1,12 @@
 //! `srrf-train --config configs/modelnet.toml`: trains the SRRF network, or a learned baseline.
 
-use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use srrf_args::{Failure, INTERRUPTED, run_program};
+use srrf_args::{Failure, INTERRUPTED, Output, files, run_program};
 use srrf_cloud::profile;
 use srrf_corrupt::datasets::default_data_path;
 use srrf_model::keep_freed_memory;
@@ -25,17 +24,14 @@ fn main() -> ExitCode {
     })
 }
 
-#[allow(clippy::print_stderr, reason = "the binary's one place to speak")]
 fn tell(message: &str) {
-    eprintln!("{message}");
+    Output::Aside.say(message);
 }
 
 /// Writes the reference of all keys.
 fn keys() -> Result<ExitCode, Failure> {
-    let written = std::io::stdout().write_all(key_reference().as_bytes());
-    written
-        .map(|()| ExitCode::SUCCESS)
-        .map_err(|e| Failure::failed(format!("standard output: {e}")).because(e))
+    files::write(Path::new("-"), key_reference().as_bytes())?;
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Trains what the configuration names.

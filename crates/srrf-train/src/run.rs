@@ -203,7 +203,12 @@ impl<'a, C: Trained> Training<'a, C> {
                 saved = Instant::now();
             }
         }
-        run.save()?;
+        if run.progress.step == 0 && run.folder.replaces_a_run() {
+            run.folder.bring_back()?;
+            (options.say)("no step was done: the run that was to be started over is as it was");
+        } else {
+            run.save()?;
+        }
         bar.abandon();
         let best = options.folder.join(BEST);
         let RunProgress { step, skipped, .. } = run.progress;

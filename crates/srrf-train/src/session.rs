@@ -4,12 +4,16 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+use srrf_args::Places;
 use srrf_baselines::{BASELINES, BaselineVisitor, LearnedConfig, visit};
 use srrf_model::SrrfConfig;
 
-use crate::config::{ConfigError, Layers, TrainConfig, read_layers};
+use crate::checkpoint;
+use crate::config::{ConfigError, Layers, StartConfig, TrainConfig, read_layers};
 use crate::data::training_shapes;
 use crate::error::TrainError;
+use crate::folder::{BEST, CONFIG, LAST};
+use crate::log;
 use crate::nets::baseline::Baseline;
 use crate::options::{Ended, Existing, RunOptions};
 use crate::run::run;
@@ -81,13 +85,15 @@ impl Session<'_> {
     fn train<C: Trained>(self) -> Result<Ended, TrainError> {
         let Self { layers, overrides, stop } = self;
         let mut config = TrainConfig::<C>::resolve(layers)?;
+        let folder = overrides.folder.clone().unwrap_or_else(|| Path::new("runs").join(&config.name));
+        check_places(layers, &config, &folder)?;
         let device = overrides.device.clone().or(config.device.take()).unwrap_or_else(|| "flex".into());
         let devices = srrf_model::devices(&device)?;
         config.device = Some(device.clone());
         let shapes =
             training_shapes(&config, overrides.data.as_deref(), overrides.environment_data.as_deref())?;
         let options = RunOptions {
-            folder: overrides.folder.clone().unwrap_or_else(|| Path::new("runs").join(&config.name)),
+            folder,
             threads: overrides.threads,
             existing: overrides.existing,
             until_step: overrides.until_step,
@@ -99,6 +105,34 @@ impl Session<'_> {
         (options.say)(&format!("run {folder}, device {device}, {} threads", options.threads));
         run(&config, &options, shapes, devices, stop)
     }
+}
+
+/// Checks that the run writes none of the files that it reads. Its own resolved configuration loses nothing by being
+/// written again.
+fn check_places<C: Trained>(
+    layers: &Layers,
+    config: &TrainConfig<C>,
+    folder: &Path,
+) -> Result<(), TrainError> {
+    let resolved = toml::to_string(config).ok();
+    let mut places = Places::new();
+    if layers.alone().is_none() || layers.alone() != resolved.as_deref() {
+        for path in layers.files() {
+            places = places.reads("the configuration", path);
+        }
+    }
+    let starts: Vec<&String> = match &config.start {
+        None => Vec::new(),
+        Some(StartConfig::Whole(start)) => vec![start],
+        Some(StartConfig::Parts(parts)) => parts.values().collect(),
+    };
+    for start in starts.into_iter().map(Path::new).filter(|start| start.is_file()) {
+        places = places.reads("`start` of the configuration", start);
+    }
+    for name in [CONFIG, BEST, LAST, checkpoint::FILE, log::FILE, log::PICTURE] {
+        places = places.writes_into("the run's folder", folder, name);
+    }
+    places.check().map_err(|failure| TrainError::Places(Box::new(failure)))
 }
 
 impl Layers {

@@ -1,6 +1,5 @@
 //! [`CoarsePose`]: what the network found, before any refinement.
 
-use serde_json::{Value, json};
 use srrf_cloud::{Branch, Registration, Rigid, Skeletons, SoftMatch};
 
 use crate::target::PreparedPair;
@@ -41,27 +40,4 @@ impl CoarsePose {
         let target_from_source = pair.frame.undo_pose(&found.target_from_source);
         Self { target_from_source, branches, lambda: found.lambda, skeletons, matches }
     }
-
-    pub(crate) fn to_json(&self) -> Value {
-        let branches: serde_json::Map<String, Value> = self
-            .branches
-            .iter()
-            .map(|b| {
-                let value =
-                    json!({ "target_from_source": matrix(&b.target_from_source), "inlier_ratio": b.inlier_ratio });
-                (b.kind.to_string(), value)
-            })
-            .collect();
-        json!({
-            "target_from_source": matrix(&self.target_from_source),
-            "branches": branches,
-            "lambda": self.lambda,
-        })
-    }
-}
-
-/// A pose as 4 rows of 4.
-pub(crate) fn matrix(pose: &Rigid) -> Value {
-    let m = pose.to_matrix4();
-    json!((0..4).map(|i| m.row(i).iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>())
 }

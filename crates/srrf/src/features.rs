@@ -1,5 +1,6 @@
 //! [`Features`]: what the probability that a pose is right is computed from.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_cloud::Rigid;
 use srrf_refine::{Evidence, Refinement, Verdict};
@@ -10,7 +11,7 @@ const WELL_SUPPORTED: f64 = 0.95;
 const APART_DEG: f64 = 5.0;
 
 /// What the probability is computed from: numbers without a unit, of the pose and of its rivals. The truth plays no part.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Features {
     /// Share of the source that lies on the target.

@@ -26,6 +26,7 @@
 extern crate self as srrf;
 
 mod align;
+mod answer;
 mod benchmark;
 mod calibration;
 #[doc(hidden)]
@@ -52,6 +53,7 @@ mod target;
 mod warning;
 
 pub use align::align;
+pub use answer::{Answer, AnswerOrError, AnswerVersion, NoAnswer, RunKeys, answer_schema};
 pub use calibration::{CalibrationError, Logistic};
 pub use coarse::CoarsePose;
 pub use error::{Error, NoPose};

@@ -1,5 +1,6 @@
 //! The network as a source of starts.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid, thin_to};
 use srrf_model::weights::LoadedModel;
@@ -13,7 +14,7 @@ const THINNED: usize = 8192;
 const GLANCE_TOKENS: usize = 128;
 
 /// Which weights a network has.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct WeightsId {
     /// Their name.
     pub name: String,

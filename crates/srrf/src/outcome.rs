@@ -1,12 +1,12 @@
 //! [`Outcome`]: everything that a user may ask of a registration.
 
 use nalgebra::{Rotation3, UnitQuaternion};
-use serde::{Serialize, Serializer};
-use serde_json::{Value, json};
-use srrf_cloud::{EulerXyz, Rigid};
+use schemars::JsonSchema;
+use serde::Serialize;
+use srrf_cloud::Rigid;
 use srrf_refine::{Evidence, Refinement};
 
-use crate::coarse::{CoarsePose, matrix};
+use crate::coarse::CoarsePose;
 use crate::features::Features;
 use crate::network::WeightsId;
 use crate::options::Method;
@@ -17,7 +17,7 @@ use crate::start::Start;
 use crate::warning::Warning;
 
 /// Numbers of points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct PointCounts {
     /// Of the source.
     pub source: usize,
@@ -26,10 +26,11 @@ pub struct PointCounts {
 }
 
 /// A start that was tried.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct TriedStart {
     /// Where it comes from.
     #[serde(rename = "name")]
+    #[schemars(with = "String")]
     pub start: Start,
     /// As [`srrf_refine::StartSupport::support`].
     pub support: f64,
@@ -82,64 +83,5 @@ impl Outcome {
         let q = UnitQuaternion::from_rotation_matrix(&rotation).into_inner();
         let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
         [sign * q.w, sign * q.i, sign * q.j, sign * q.k]
-    }
-
-    /// All of it as JSON: `target_from_source` (4 rows of 4), `probability`, `abstain`, and the rest under
-    /// names of their own. Lengths are in the unit of the input.
-    pub fn to_json(&self) -> Value {
-        let evidence = &self.evidence;
-        let times: serde_json::Map<String, Value> =
-            self.times.iter().map(|t| (t.stage.to_string(), json!(t.seconds))).collect();
-        json!({
-            "target_from_source": matrix(&self.target_from_source),
-            "scale": self.scale,
-            "probability": self.probability,
-            "abstain": self.abstain,
-            "quaternion_wxyz": self.quaternion_wxyz(),
-            "euler_xyz_deg": EulerXyz::from_matrix(&self.target_from_source.rotation).to_deg(),
-            "translation": self.target_from_source.translation.as_slice(),
-            "method": self.method.name(),
-            "start": self.start,
-            "network": self.network.as_ref().map(CoarsePose::to_json),
-            "refinement": self.refinement.as_ref().map(|r| json!({
-                "kept": r.kept,
-                "verdict": r.verdict,
-                "verdict_text": r.verdict.to_string(),
-                "converged": r.converged,
-                "iterations": r.iterations,
-                "support": r.support,
-                "residual_correlation": r.residuals.correlation,
-                "residual_correlation_across": r.residuals.across_correlation,
-                "starts": self.tried,
-            })),
-            "evidence": {
-                "spacing": evidence.spacing,
-                "inlier_threshold": evidence.inlier_threshold,
-                "inliers": evidence.inliers,
-                "fitness": evidence.fitness,
-                "fitness_denominator": "source points asked",
-                "source_points_asked": evidence.source_points,
-                "inlier_rmse": evidence.inlier_rmse,
-                "overlap_source": evidence.fitness,
-                "overlap_target": evidence.overlap_target,
-                "target_points_asked": evidence.target_points,
-                "information": (0..6).map(|i| evidence.information.row(i).iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>(),
-                "information_order": "rotation x y z (radians), translation x y z, in the target frame about `information_centre`",
-                "information_centre": evidence.information_centre.as_slice(),
-            },
-            "features": self.features,
-            "points": self.points,
-            "seconds": times,
-            "seed": self.seed,
-            "weights": self.weights,
-            "warnings": self.warnings,
-        })
-    }
-}
-
-/// As [`Outcome::to_json`].
-impl Serialize for Outcome {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        self.to_json().serialize(serializer)
     }
 }

@@ -34,6 +34,13 @@ pub enum Warning {
         /// Its standard error, where there is one.
         spread: Option<f64>,
     },
+    /// The pose that was given lays the clouds far apart, and its inverse lays them close.
+    Inverted {
+        /// Median distance of the source's points from the target, at the pose.
+        given: f64,
+        /// At its inverse.
+        inverse: f64,
+    },
     /// Points of a cloud were left out, because a coordinate is NaN or infinite.
     LeftOut {
         /// Name of the cloud.
@@ -77,6 +84,11 @@ impl fmt::Display for Warning {
             Self::ScaleUndetermined { factor, spread: None } => {
                 write!(f, "The clouds do not determine the scale, {factor:.4} is as good as any other.")
             }
+            Self::Inverted { given, inverse } => write!(
+                f,
+                "The pose that was given looks inverted: the source's points lie {given:.3e} off the target at it, and \
+                 {inverse:.3e} at its inverse. If it is source_from_target, give its inverse."
+            ),
             Self::LeftOut { cloud, points } => {
                 let were = if *points == 1 {
                     "point with NaN or infinity was"

@@ -38,7 +38,7 @@ mod stl;
 mod text;
 
 pub use arrays::{ArrayError, NpzArrays, read_npy, read_npz};
-pub use atomic::write_atomically;
+pub use atomic::{place_of, remove_left_overs, write_atomically};
 pub use error::{FormatError, IoError};
 pub use file::{CloudFile, Kept, format_names};
 pub use npy::Array;

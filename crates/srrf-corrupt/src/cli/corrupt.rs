@@ -7,7 +7,7 @@ use clap::Args;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use srrf_args::flags::{Quiet, Seed, value};
 use srrf_args::words::{count, points};
-use srrf_args::{Failure, Output, ProgressArgs, files};
+use srrf_args::{Failure, Output, Places, ProgressArgs, files};
 use srrf_cloud::PointCloud;
 
 use super::list::list;
@@ -80,7 +80,7 @@ pub fn corrupt(args: &CorruptArgs) -> Result<ExitCode, Failure> {
         Output::Standard.say(list().trim_end());
         return Ok(ExitCode::SUCCESS);
     };
-    files::check_cloud_output(output)?;
+    Places::new().reads("the cloud", &**input).writes_cloud("--output", &**output)?.check()?;
     let progress = args.progress.start(args.quiet.quiet);
     progress.step(format!("reading {input:?}"));
     let input = files::read(input, None)?;

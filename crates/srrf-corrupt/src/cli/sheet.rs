@@ -7,7 +7,7 @@ use clap::Args;
 use rand::{SeedableRng, rngs::ChaCha8Rng, seq::index};
 use srrf_args::flags::{Quiet, Seed, UpAxis, help, value};
 use srrf_args::numbers::{real, whole};
-use srrf_args::{Failure, Output, files};
+use srrf_args::{Failure, Output, OutputKind, Places, files};
 use srrf_cloud::PointCloud;
 
 use super::draw::ContactSheet;
@@ -72,7 +72,8 @@ pub struct SheetArgs {
 /// # Errors
 /// [`Failure`], with its exit code.
 pub fn sheet(args: &SheetArgs) -> Result<ExitCode, Failure> {
-    files::check_output(&args.output)?;
+    let places = Places::new().reads("the cloud", args.input.as_deref());
+    places.writes("--output", &*args.output, OutputKind::PNG)?.check()?;
     let mut rng = ChaCha8Rng::seed_from_u64(args.seed.seed);
     let (cloud, name) = match &args.input {
         Some(path) => {

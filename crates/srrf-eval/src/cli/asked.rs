@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use serde::de::DeserializeOwned;
 use srrf_args::flags::Threads;
+use srrf_args::{Failure, OutputKind, Places};
 use srrf_corrupt::{CorruptionKind, PairConfig, RotationRange, Severity};
 
 use super::EvalOptions;
@@ -44,6 +45,25 @@ impl EvalOptions {
             dcp_poses: self.rotation == "dcp",
             spread: self.spread,
         })
+    }
+
+    /// What the run reads and writes.
+    ///
+    /// # Errors
+    /// [`Failure::usage`] for a file of pairs that cannot be written, or would be one that is read.
+    pub fn check_places(&self) -> Result<(), Failure> {
+        let mut places = Places::new().reads("--pairs", self.pairs.as_deref());
+        for path in &self.transforms {
+            places = places.reads("--transforms", &**path);
+        }
+        for (method, path) in self.weights_by_method().iter().filter(|(_, path)| path.is_file()) {
+            places = places.reads(format!("the weights of {method}"), &**path);
+        }
+        places = places.writes("--export-pairs", self.export_pairs.as_deref(), OutputKind::NPZ)?;
+        for name in crate::report::file_names() {
+            places = places.writes_into("--output", &self.out, &name);
+        }
+        places.check()
     }
 
     fn pair_config(&self) -> Result<PairConfig, EvalError> {

@@ -40,6 +40,12 @@ pub fn prepare(out: &Path) -> Result<(), EvalError> {
         .map_err(|source| EvalError::OutDir { path: out.to_owned(), source })
 }
 
+/// The names of all files that [`write()`] may leave.
+pub fn file_names() -> impl Iterator<Item = String> {
+    let curves = QUANTITIES.iter().filter(|q| q.principal).map(|q| format!("curves_{}.svg", q.key));
+    ["table.md", "table.csv", "results.json"].into_iter().map(str::to_owned).chain(curves)
+}
+
 /// Writes the whole report to the folder `out`, file by file under temporary names, and gives the
 /// paths. Curves of an earlier run that this run does not draw are removed.
 ///

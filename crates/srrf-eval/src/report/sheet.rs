@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use srrf_args::words::visible;
+
 use crate::rows::TableRow;
 
 /// A cell of a [`Sheet`].
@@ -34,7 +36,7 @@ impl Cell {
     /// The cell as it is printed.
     pub fn printed(&self) -> String {
         match self {
-            Self::Text(text) => text.clone(),
+            Self::Text(text) => visible(text).into_owned(),
             Self::Number(value, digits) | Self::Best(value, digits) => format!("{value:.digits$}"),
             Self::None => "-".into(),
         }
@@ -106,10 +108,11 @@ impl Sheet {
 
     /// As Markdown, under a heading of this level; a plain line where it is 0.
     pub fn markdown(&self, level: usize) -> String {
-        let mut lines = vec![self.head.clone()];
+        let mut lines = vec![self.head.iter().map(|head| plain_markdown(head)).collect::<Vec<_>>()];
         for row in &self.rows {
             let bold = |cell: &Cell| match cell {
                 Cell::Best(..) => format!("**{}**", cell.printed()),
+                Cell::Text(words) => plain_markdown(words),
                 _ => cell.printed(),
             };
             lines.push(row.iter().map(bold).collect());
@@ -122,10 +125,13 @@ impl Sheet {
     /// As CSV, numbers in full.
     pub fn csv(&self) -> String {
         let quoted = |text: &str| {
+            let text = visible(text);
+            // What a spreadsheet would run as a formula.
+            let formula = if text.starts_with(['=', '+', '-', '@', '\t']) { "'" } else { "" };
             if text.contains([',', '"', '\n']) {
-                format!("\"{}\"", text.replace('"', "\"\""))
+                format!("\"{formula}{}\"", text.replace('"', "\"\""))
             } else {
-                text.to_owned()
+                format!("{formula}{text}")
             }
         };
         let line = |cells: Vec<String>| cells.join(",") + "\n";
@@ -206,6 +212,20 @@ fn aligned(lines: &[Vec<String>]) -> String {
     text
 }
 
+/// Text that others wrote, as a cell of a Markdown table: no end of the cell or the line, no link, picture or tag.
+fn plain_markdown(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    for c in visible(text).chars() {
+        match c {
+            '\n' | '\t' => plain.push(' '),
+            '<' => plain.push_str("&lt;"),
+            '|' | '[' | '`' => plain.extend(['\\', c]),
+            _ => plain.push(c),
+        }
+    }
+    plain
+}
+
 /// Text for HTML, in elements and quoted attributes.
 pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
@@ -233,6 +253,21 @@ mod tests {
         assert_eq!(text.matches("**2.00**").count(), 2, "{text}");
         assert_eq!(text.matches("**").count(), 2 * 3, "{text}");
         assert!(text.contains("**0.9**") && text.contains("Read \"this\"."), "{text}");
+    }
+
+    #[test]
+    fn names_that_others_gave_are_text_only() {
+        let mut sheet = Sheet::new("k", "t", "", &["method"]);
+        for name in ["=1+1", "@x", "-2", "a|b", "![x](http://e)", "<script>", "\u{1b}[31mred", "two\nlines"] {
+            sheet.rows.push(vec![name.into()]);
+        }
+        let csv = sheet.csv();
+        assert!(csv.starts_with("method\n'=1+1\n'@x\n'-2\na|b\n"), "{csv}");
+        let text = sheet.markdown(0);
+        for wanted in ["| a\\|b ", "!\\[x](http://e)", "&lt;script>", "two lines"] {
+            assert!(text.contains(wanted), "{wanted}: {text}");
+        }
+        assert!([&csv, &text, &sheet.html()].iter().all(|t| !t.contains('\u{1b}')), "{text}");
     }
 
     #[test]

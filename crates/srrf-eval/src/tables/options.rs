@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use srrf_args::flags::{MOST_POINTS, MOST_SHAPES, MOST_THREADS, help, value};
 use srrf_args::numbers::{entry, whole};
+use srrf_args::{Failure, Places};
 use srrf_model::embedded;
 
 use crate::cli::shared::{OF_BASELINES, TEST_SPLIT, weights_by_method};
@@ -174,6 +175,24 @@ fn named_weights(text: &str) -> Result<(String, PathBuf), String> {
 }
 
 impl TablesOptions {
+    /// Checks that no file or folder is written twice, or read as well.
+    ///
+    /// # Errors
+    /// [`Failure::usage`], which names both.
+    pub fn check_places(&self) -> Result<(), Failure> {
+        let weights = [&self.ddl_weights, &self.no_ddl_weights].into_iter().flatten();
+        let variants = self.variant.iter().map(|(_, path)| path);
+        let mut places = Places::new();
+        for path in weights.chain(variants).filter(|path| path.is_file()) {
+            places = places.reads("the weights", &**path);
+        }
+        for name in ["report.html", "tables.md", "results.json"] {
+            places = places.writes_into("--output", &self.out, name);
+        }
+        places = places.fills("--output", &*self.out).fills("--book", self.book.as_deref());
+        places.fills("--cache", self.cache.as_deref()).check()
+    }
+
     /// The models trained clean, by method; empty where there are none.
     pub(crate) fn clean_models(&self) -> BTreeMap<String, PathBuf> {
         let mut models = weights_by_method(&self.clean_weights);

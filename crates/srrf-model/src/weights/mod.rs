@@ -3,6 +3,7 @@
 
 mod error;
 mod parameters;
+mod serialize;
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -18,6 +19,7 @@ use crate::srrf::SrrfConfig;
 
 pub use error::WeightsError;
 pub use parameters::{parameters, with_parameters};
+pub use serialize::serialize;
 
 /// Header key of the model's name.
 const NAME_KEY: &str = "name";
@@ -68,15 +70,14 @@ pub fn to_safetensors<C: NetworkConfig>(
         parameters.into_iter().map(halved).collect::<Result<_, _>>()?;
     let views = tensors
         .iter()
-        .map(|(path, shape, bytes)| Ok((path.as_str(), TensorView::new(Dtype::F16, shape.clone(), bytes)?)))
+        .map(|(path, shape, bytes)| Ok((path.clone(), TensorView::new(Dtype::F16, shape.clone(), bytes)?)))
         .collect::<Result<Vec<_>, _>>()
         .map_err(|source| WeightsError::Format { origin: origin(), source })?;
     let config = header_json(config, &origin())?;
-    let mut header: HashMap<String, String> = notes.iter().map(|(k, v)| (k.clone(), v.clone())).collect();
+    let mut header = notes.clone();
     header.insert(C::KEY.into(), config);
     header.insert(NAME_KEY.into(), name.into());
-    safetensors::serialize(views, Some(header))
-        .map_err(|source| WeightsError::Format { origin: origin(), source })
+    serialize(views, &header).map_err(|source| WeightsError::Format { origin: origin(), source })
 }
 
 /// Writes a network to `path`, whole or not at all, as [`to_safetensors`] has it.
@@ -105,10 +106,11 @@ pub fn with_config<C: NetworkConfig>(
 ) -> Result<Vec<u8>, WeightsError> {
     let format = |source| WeightsError::Format { origin: origin.to_owned(), source };
     let (_, header) = SafeTensors::read_metadata(bytes).map_err(format)?;
-    let mut metadata = header.metadata().clone().unwrap_or_default();
+    let mut metadata: BTreeMap<String, String> =
+        header.metadata().clone().unwrap_or_default().into_iter().collect();
     metadata.insert(C::KEY.into(), header_json(config, origin)?);
     let tensors = SafeTensors::deserialize(bytes).map_err(format)?;
-    let written = safetensors::serialize(tensors.tensors(), Some(metadata)).map_err(format)?;
+    let written = serialize(tensors.tensors(), &metadata).map_err(format)?;
     parse::<C>(&written, origin, &Device::flex())?;
     Ok(written)
 }
@@ -148,7 +150,7 @@ pub fn parse<C: NetworkConfig>(
         None => Err("the entry is missing".to_string()),
     }
     .map_err(|why| WeightsError::Header { origin: origin.clone(), key: C::KEY, why })?;
-    config.check().map_err(|e| WeightsError::Header {
+    config.check_ranges().map_err(|e| WeightsError::Header {
         origin: origin.clone(),
         key: C::KEY,
         why: e.to_string(),

@@ -79,20 +79,23 @@ impl ModuleMapper for Applier {
 
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let name = self.path.join(".");
+        // Nothing is allocated for a parameter that the file does not have: its sizes are the header's word only.
+        let wanted: [usize; D] = param.lazy_shape().dims();
+        let fits = self.values.get(&name).is_some_and(|(shape, _)| *shape == wanted);
+        if !fits {
+            let why = match self.values.get(&name) {
+                Some((shape, _)) => format!("the file has shape {shape:?}, the network {wanted:?}"),
+                None => "missing from the file".to_string(),
+            };
+            self.failed.get_or_insert((name, why));
+            return param;
+        }
         let (id, tensor, mapper) = param.consume();
-        let wanted = tensor.dims();
         let tensor = match self.values.remove(&name) {
-            Some((shape, values)) if shape == wanted => {
+            Some((_, values)) => {
                 Tensor::from_data(TensorData::new(values, wanted), (&tensor.device(), tensor.dtype()))
             }
-            found => {
-                let why = match found {
-                    Some((shape, _)) => format!("the file has shape {shape:?}, the network {wanted:?}"),
-                    None => "missing from the file".to_string(),
-                };
-                self.failed.get_or_insert((name, why));
-                tensor
-            }
+            None => tensor,
         };
         Param::from_mapped_value(id, tensor, mapper)
     }

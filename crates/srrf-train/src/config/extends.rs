@@ -84,6 +84,11 @@ impl Layers {
         self.files.last().map_or(Path::new(""), |(path, _)| path)
     }
 
+    /// All files.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
+        self.files.iter().map(|(path, _)| path.as_path())
+    }
+
     /// The text of the one file that this is, for messages with line and column.
     pub(crate) fn alone(&self) -> Option<&str> {
         self.alone.as_deref()

@@ -7,8 +7,8 @@ use schemars::{JsonSchema, schema_for};
 use serde_json::Value as Json;
 use srrf_baselines::{BASELINES, BaselineVisitor, LearnedConfig, visit};
 use srrf_model::SrrfConfig;
+use srrf_model::ranges::{range_of, resolved};
 
-use super::ranges::{range_of, resolved};
 use super::train_config::TrainConfig;
 use crate::nets::baseline::Baseline;
 use crate::seam::Trained;

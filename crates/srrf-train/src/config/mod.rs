@@ -4,7 +4,6 @@
 mod error;
 mod extends;
 mod keys;
-mod ranges;
 mod sections;
 mod sweep;
 mod train_config;

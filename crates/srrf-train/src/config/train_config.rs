@@ -7,10 +7,10 @@ use schemars::{JsonSchema, schema_for};
 use serde::{Deserialize, Serialize};
 use srrf_corrupt::PairConfig;
 use srrf_model::SrrfConfig;
+use srrf_model::ranges::out_of_range;
 
 use super::error::ConfigError;
 use super::extends::Layers;
-use super::ranges::out_of_range;
 use super::sections::{DataConfig, DataSource, DrawConfig, KeepConfig, OptimizerConfig};
 use super::sweep::read_layers;
 use crate::seam::{StageOf, Trained};

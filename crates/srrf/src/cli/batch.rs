@@ -1,26 +1,53 @@
 //! `srrf batch`: many pairs, in parallel.
 
+use std::collections::BTreeSet;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use rayon::ThreadPoolBuilder;
 use serde_json::{Value, json};
 use srrf::{Registrar, Request};
 
-use super::batch_output::ResultLines;
-use super::batch_pairs::{ListedPair, PairList};
 use super::common::{failed, left_out, to_json, unusable};
 use super::method::MethodArgs;
-use super::scale::ScaleArgs;
-use super::transform;
-use srrf_args::Failure;
-use srrf_args::flags::{Common, value};
+use super::page::{self, PageArgs};
+use super::poses::{PoseReading, looks_inverted};
+use super::scale::{self, ScaleArgs};
+use srrf_args::files::Input;
+use srrf_args::flags::{Common, Quiet, value};
 use srrf_args::words::{count, counted};
-use srrf_args::{Output, Progress};
+use srrf_args::{Failure, Output, OutputKind, OutputLock, Places, Progress};
 use srrf_args::{files, interrupt};
+
+mod csv;
+mod digest;
+mod list;
+mod overview;
+mod pair;
+mod parquet_list;
+mod results;
+mod row;
+mod shard;
+mod shared;
+mod store;
+mod table;
+
+use digest::Digest;
+use list::PairList;
+use overview::Overview;
+use pair::ListedPair;
+use results::Results;
+use row::BatchRow;
+use shard::Shard;
+use shared::{ReadyTarget, SharedTargets};
+
+/// What results are written as.
+const RESULTS: OutputKind =
+    OutputKind { what: "rows of results", extensions: &["jsonl", "ndjson", "csv", "parquet"] };
 
 const HELP: &str = "Exit codes:
   0    every pair has a pose (see `abstain` in its line)
@@ -28,20 +55,39 @@ const HELP: &str = "Exit codes:
   2    bad usage, list or results file
   130  interrupted; the same command goes on where it stopped";
 
-/// Register the pairs of a CSV list, in parallel: one JSON line a pair, in the order of the list.
+/// Register the pairs of a list, in parallel: one row a pair, in the order of the list.
 ///
-/// The list has the columns `source`, `target` and, if wanted, `initial` (a file with a first guess); files are
-/// relative to it. Pairs that are in the results already are skipped, so that the same command goes on after an
-/// interruption; delete a line to have its pair done again.
+/// The list is CSV, JSON lines or Parquet, with the columns `source`, `target` and, if wanted, `initial` (a file with a first
+/// guess) and `id`; files are relative to it, other columns are carried to the results. Pairs that are in the results
+/// already are skipped, so that the same command goes on after an interruption, and a list can grow.
 #[derive(Debug, Args)]
-#[command(after_help = HELP)]
+#[command(after_help = HELP, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct BatchArgs {
-    /// The list
-    pairs: PathBuf,
+    #[command(subcommand)]
+    verb: Option<BatchVerb>,
 
-    /// The results, one JSON object a line; or `-`
-    #[arg(short, long, alias = "out", value_name = value::FILE)]
-    output: PathBuf,
+    /// The list
+    #[arg(required = true)]
+    pairs: Option<PathBuf>,
+
+    /// The results: JSON lines, or CSV or Parquet by the extension; or `-`
+    #[arg(short, long, alias = "out", value_name = value::FILE, required = true)]
+    output: Option<PathBuf>,
+
+    /// Only this part of the list, such as 3/64; `srrf batch merge` joins the parts
+    #[arg(long, value_name = "K/N")]
+    shard: Option<Shard>,
+
+    /// Register pairs again that are in the results without a pose
+    #[arg(long)]
+    retry_failed: bool,
+
+    /// Write an overview and a page for each pair into a folder
+    #[arg(long, value_name = value::FOLDER)]
+    html: Option<PathBuf>,
+
+    #[command(flatten)]
+    page: PageArgs,
 
     #[command(flatten)]
     method: MethodArgs,
@@ -50,7 +96,80 @@ pub struct BatchArgs {
     scale: ScaleArgs,
 
     #[command(flatten)]
+    reading: PoseReading,
+
+    #[command(flatten)]
     common: Common,
+}
+
+/// What can be done with results.
+#[derive(Debug, Subcommand)]
+enum BatchVerb {
+    Merge(MergeArgs),
+}
+
+/// Join results of several runs: each pair once; the extension of the output says the format.
+///
+/// Of two rows of one pair the one with a pose counts. Two different poses of one pair are an error.
+#[derive(Debug, Args)]
+struct MergeArgs {
+    /// The results
+    #[arg(required = true)]
+    results: Vec<PathBuf>,
+
+    /// Where they go together
+    #[arg(short, long, value_name = value::FILE)]
+    output: PathBuf,
+
+    /// The list whose order they get; pairs that are missing are counted
+    #[arg(long, value_name = value::FILE)]
+    list: Option<PathBuf>,
+
+    #[command(flatten)]
+    quiet: Quiet,
+}
+
+/// What results of a batch come to: counts, times, reliability, the slowest and the least probable pairs.
+#[derive(Debug, Args)]
+pub struct SummaryArgs {
+    /// The results: JSON lines, CSV or Parquet
+    results: PathBuf,
+}
+
+/// Sums up results.
+///
+/// # Errors
+/// [`Failure`], with its exit code.
+pub fn summary(args: &SummaryArgs) -> Result<ExitCode, Failure> {
+    Output::Standard.say(&digest_of(&args.results)?.text());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn digest_of(results: &std::path::Path) -> Result<Digest, Failure> {
+    let mut digest = Digest::default();
+    store::each_row(results, &mut |row| {
+        digest.add(&row);
+        Ok(())
+    })?;
+    Ok(digest)
+}
+
+fn merge(args: &MergeArgs) -> Result<ExitCode, Failure> {
+    let mut places = Places::new().reads("--list", args.list.as_deref());
+    for results in &args.results {
+        places = places.reads("the results", &**results);
+    }
+    places.writes("--output", &*args.output, RESULTS)?.check()?;
+    let _lock = OutputLock::take(&args.output)?;
+    let listed = args.list.as_deref().map(PairList::read).transpose()?;
+    let ids: Vec<&str> = listed.iter().flat_map(|list| &list.rows).map(|pair| &*pair.id).collect();
+    let pairs = results::join(&args.results, &ids, &args.output)?;
+    let out = Output::new(args.quiet.quiet, false);
+    out.say(&format!("{} in {}", counted(pairs, "pair"), args.output.display()));
+    if listed.is_some() && pairs < ids.len() {
+        out.say(&format!("{} of the list are missing: run their shards", counted(ids.len() - pairs, "pair")));
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Registers all pairs.
@@ -58,38 +177,75 @@ pub struct BatchArgs {
 /// # Errors
 /// [`Failure`], with its exit code.
 pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
-    files::check_output(&args.output)?;
+    if let Some(BatchVerb::Merge(merge_args)) = &args.verb {
+        return merge(merge_args);
+    }
+    let (Some(list), Some(output)) = (&args.pairs, &args.output) else {
+        return Err(Failure::usage("name a list, and a file for the results by --output".into()));
+    };
+    let places = Places::new().reads("the list", &**list).writes("--output", &**output, RESULTS)?;
+    places.check()?;
+    let _lock = OutputLock::take(output)?;
     let threads = args.common.threads.start()?;
-    let pairs = PairList::read(&args.pairs)?;
+    let pairs = PairList::read(list)?;
+    pairs.read_by(places).check()?;
     let bar = args.common.progress();
     bar.step("loading the network");
     let registrar = Registrar::new(args.scale.options(args.method.options())).map_err(unusable)?;
     let described = args.describe();
-    let (results, done) = ResultLines::open(&args.output, &pairs.rows, &described)?;
-    let todo: Vec<&ListedPair> = pairs.rows.iter().filter(|row| !done.contains_key(&row.number)).collect();
-    let out = Output::new(args.common.quiet.quiet, files::is_stream(&args.output));
+    let (results, done) = Results::open(output, &pairs.rows, &described, args.retry_failed)?;
+    let mine = |row: &&ListedPair| args.shard.is_none_or(|shard| shard.has(&row.id));
+    let asked = pairs.rows.iter().filter(mine).count();
+    let todo: Vec<&ListedPair> =
+        pairs.rows.iter().filter(mine).filter(|row| !done.contains_key(&row.id)).collect();
+    let out = Output::new(args.common.quiet.quiet, files::is_stream(output));
     bar.clear();
+    if let Some(shard) = args.shard {
+        out.say(&format!("shard {shard}: {} of {}", count(asked), pairs_of(pairs.rows.len())));
+    }
     if !done.is_empty() {
         out.say(&format!("{} of {} done already", count(done.len()), pairs_of(pairs.rows.len())));
+    }
+    if let Some(folder) = &args.html {
+        std::fs::create_dir_all(folder).map_err(|e| {
+            Failure::usage(format!("cannot make the folder {folder:?}: {e}; choose another --html"))
+        })?;
     }
     interrupt::advise("; the same command goes on where this one stopped");
 
     bar.counted("registering", todo.len(), "pairs");
-    let batch = Batch { pairs: &pairs, registrar: &registrar, described: &described, scale: args.scale };
-    let tally = batch.run(&todo, threads, results, &bar)?;
+    let targets = SharedTargets::new(todo.iter().map(|row| &*row.target));
+    let batch = Batch { args, pairs: &pairs, registrar: &registrar, described: &described, targets };
+    let (results, digest) = batch.run(&todo, threads, results, &bar)?;
+    results.finish(&pairs.rows)?;
     bar.clear();
     let before = done.values().filter(|has_pose| !**has_pose).count();
-    out.say(&format!(
-        "{}: {} probably right, {} abstained, {} without a pose",
-        pairs_of(todo.len()),
-        count(todo.len() - tally.abstained - tally.failed),
-        count(tally.abstained),
-        count(tally.failed)
-    ));
+    out.say(&if todo.is_empty() { digest.counts() } else { digest.text() });
     if before > 0 {
-        out.say(&format!("{} done before without a pose: delete their lines to try again", pairs_of(before)));
+        out.say(&format!("{} done before without a pose: --retry-failed tries again", pairs_of(before)));
     }
-    Ok(if tally.failed + before > 0 { ExitCode::from(1) } else { ExitCode::SUCCESS })
+    if let (Some(folder), false) = (&args.html, files::is_stream(output)) {
+        out.say(&overview(folder, output)?);
+    }
+    Ok(if digest.failed + before > 0 { ExitCode::from(1) } else { ExitCode::SUCCESS })
+}
+
+/// Writes the overview of all results, those of earlier runs too.
+fn overview(folder: &std::path::Path, results: &std::path::Path) -> Result<String, Failure> {
+    let mut columns = BTreeSet::new();
+    store::each_row(results, &mut |row| {
+        columns.extend(row.columns().cloned());
+        Ok(())
+    })?;
+    let digest = digest_of(results)?.text();
+    let mut overview = Overview::new(folder, &digest, columns.into_iter().collect());
+    store::each_row(results, &mut |row| {
+        overview.add(&row);
+        Ok(())
+    })?;
+    let index = overview::index_of(folder);
+    files::write(&index, overview.finish().as_bytes())?;
+    Ok(format!("wrote {}: open it in a browser", index.display()))
 }
 
 /// `1 pair`, `1,234 pairs`.
@@ -112,18 +268,19 @@ impl BatchArgs {
     }
 }
 
-/// How many pairs went otherwise than hoped.
-#[derive(Debug, Clone, Copy, Default)]
-struct Tally {
-    abstained: usize,
-    failed: usize,
-}
-
 struct Batch<'a> {
+    args: &'a BatchArgs,
     pairs: &'a PairList,
     registrar: &'a Registrar,
     described: &'a Value,
-    scale: ScaleArgs,
+    targets: SharedTargets,
+}
+
+/// What the workers share.
+struct State {
+    results: Results,
+    digest: Digest,
+    outcome: Result<(), Failure>,
 }
 
 impl Batch<'_> {
@@ -133,19 +290,19 @@ impl Batch<'_> {
         &self,
         todo: &[&ListedPair],
         threads: usize,
-        results: ResultLines,
+        results: Results,
         bar: &Progress,
-    ) -> Result<Tally, Failure> {
+    ) -> Result<(Results, Digest), Failure> {
         let workers = threads.min(todo.len()).max(1);
         let next = AtomicUsize::new(0);
-        let state = Mutex::new((results, Tally::default(), Ok(())));
+        let state = Mutex::new(State { results, digest: Digest::default(), outcome: Ok(()) });
         let work = || {
             let pool = ThreadPoolBuilder::new().num_threads((threads / workers).max(1)).build();
             let pool = match pool {
                 Ok(pool) => pool,
                 Err(e) => {
                     let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
-                    state.2 =
+                    state.outcome =
                         Err(Failure::failed(format!("cannot start worker threads: {e}; try --threads 1")));
                     return;
                 }
@@ -153,14 +310,14 @@ impl Batch<'_> {
             loop {
                 let place = next.fetch_add(1, Ordering::Relaxed);
                 let Some(row) = todo.get(place) else { return };
-                let (value, abstain) = pool.install(|| self.line(row));
+                let line = pool.install(|| self.line(row));
                 let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
-                state.1.abstained += usize::from(abstain == Some(true));
-                state.1.failed += usize::from(abstain.is_none());
-                if state.2.is_ok() {
-                    state.2 = state.0.put(place, &value);
+                let State { results, digest, outcome } = &mut *state;
+                digest.add(&line);
+                if outcome.is_ok() {
+                    *outcome = results.put(place, &line);
                 }
-                if state.2.is_err() {
+                if outcome.is_err() {
                     return;
                 }
                 bar.advance(1);
@@ -171,36 +328,50 @@ impl Batch<'_> {
                 scope.spawn(work);
             }
         });
-        let (_, tally, outcome) = state.into_inner().unwrap_or_else(PoisonError::into_inner);
-        outcome.map(|()| tally)
+        let State { results, digest, outcome } = state.into_inner().unwrap_or_else(PoisonError::into_inner);
+        outcome.map(|()| (results, digest))
     }
 
-    /// The line of a pair, and whether its pose is doubtful; `None` without a pose.
-    fn line(&self, row: &ListedPair) -> (Value, Option<bool>) {
-        let (mut value, abstain) = match self.register(row) {
-            Ok((value, abstain)) => (value, Some(abstain)),
-            Err(failure) => {
-                (json!({ "source": row.source, "target": row.target, "error": failure.to_string() }), None)
-            }
+    /// The row of a pair, with or without a pose.
+    fn line(&self, row: &ListedPair) -> BatchRow {
+        let target = || -> Result<ReadyTarget, String> {
+            let input = self.read_target(row).map_err(|e| e.to_string())?;
+            let target = self.registrar.prepare(&input.cloud);
+            let target = target.map_err(|e| failed(e, &row.source, &input.name).to_string())?;
+            Ok(ReadyTarget { input, target })
         };
-        if let Value::Object(map) = &mut value {
-            map.insert("pair".into(), json!(row.number));
-            map.insert("initial".into(), json!(row.initial));
-            map.insert("options".into(), self.described.clone());
-        }
-        (value, abstain)
+        // What a pair has made is not looked at again after a panic.
+        let done = catch_unwind(AssertUnwindSafe(|| {
+            self.targets
+                .with(&row.target, target, |ready| self.register(row, ready).map_err(|e| e.to_string()))
+        }));
+        let answer =
+            done.unwrap_or_else(|_| Err("a fault of the program; please report it with both files".into()));
+        BatchRow::new(row, self.described, answer)
     }
 
-    fn register(&self, row: &ListedPair) -> Result<(Value, bool), Failure> {
+    fn read_target(&self, row: &ListedPair) -> Result<Input, Failure> {
+        files::read_solid(&self.pairs.path(&row.target), None)
+    }
+
+    fn register(&self, row: &ListedPair, ready: &ReadyTarget) -> Result<Value, Failure> {
+        let ReadyTarget { input: target, target: prepared } = ready;
         let mut source = files::read_solid(&self.pairs.path(&row.source), None)?;
-        self.scale.apply(&mut source)?;
-        let target = files::read_solid(&self.pairs.path(&row.target), None)?;
-        let initial = row.initial.as_ref().map(|file| transform::read(&self.pairs.path(file))).transpose()?;
-        let request = Request { initial, ..Request::new(&source.cloud, &target.cloud) };
-        let found = self.scale.register(self.registrar, &request);
+        self.args.scale.apply(&mut source)?;
+        let read = |file: &String| self.args.reading.read(&self.pairs.path(file));
+        let initial = row.initial.as_ref().map(read).transpose()?.map(|guess| guess.target_from_source);
+        let request = Request { initial, ..Request::new(&source.cloud, prepared) };
+        let found = self.args.scale.register(self.registrar, &request);
         let mut outcome = found.map_err(|e| failed(e, &source.name, &target.name))?;
         let dropped = [source.dropped, target.dropped];
-        outcome.warnings.extend([&source, &target].into_iter().filter_map(left_out));
-        Ok((to_json(&outcome, &row.source, &row.target, dropped), outcome.abstain))
+        outcome.warnings.extend([&source, target].into_iter().filter_map(left_out));
+        outcome.warnings.extend(initial.and_then(|pose| looks_inverted(&pose, &source.cloud, &target.cloud)));
+        if let Some(folder) = &self.args.html {
+            scale::applied(&outcome, &mut source)?;
+            let pair = page::of_outcome(&outcome, &source, target, initial.as_ref(), &self.args.page);
+            let html = page::html(pair, &source, target);
+            files::write(&folder.join(overview::page_name(&row.id)), html.as_bytes())?;
+        }
+        Ok(to_json(&outcome, &row.source, &row.target, dropped))
     }
 }

@@ -1,7 +1,7 @@
 //! What several verbs share: exit codes, and what an answer or an error is called in files and messages.
 
-use serde_json::{Value, json};
-use srrf::{Outcome, Warning};
+use serde_json::Value;
+use srrf::{Answer, Outcome, PointCounts, RunKeys, Warning};
 use srrf_args::Failure;
 use srrf_args::files::Input;
 
@@ -14,15 +14,22 @@ pub const EXIT_CODES: &str = "Exit codes:
   130  interrupted; no half-written file remains";
 
 /// The figures of an answer, and of what it was made from.
+pub fn answer(outcome: &Outcome, source: &str, target: &str, dropped: [usize; 2]) -> Answer {
+    let mut answer = Answer::new(outcome);
+    answer.run = RunKeys {
+        source: Some(source.to_owned()),
+        target: Some(target.to_owned()),
+        dropped_points: Some(PointCounts { source: dropped[0], target: dropped[1] }),
+        version: Some(env!("CARGO_PKG_VERSION").to_owned()),
+        ..RunKeys::default()
+    };
+    answer
+}
+
+/// As [`answer`], as JSON.
 pub fn to_json(outcome: &Outcome, source: &str, target: &str, dropped: [usize; 2]) -> Value {
-    let mut value = outcome.to_json();
-    if let Value::Object(map) = &mut value {
-        map.insert("source".into(), json!(source));
-        map.insert("target".into(), json!(target));
-        map.insert("dropped_points".into(), json!({ "source": dropped[0], "target": dropped[1] }));
-        map.insert("version".into(), json!(env!("CARGO_PKG_VERSION")));
-    }
-    value
+    // Numbers, texts and lists of them always are JSON.
+    serde_json::to_value(answer(outcome, source, target, dropped)).unwrap_or_default()
 }
 
 /// The failure behind options that the library cannot use.

@@ -16,19 +16,17 @@ mod align_page;
 mod align_poses;
 mod align_scans;
 mod batch;
-mod batch_output;
-mod batch_pairs;
 mod common;
 mod inspect;
 mod method;
 mod page;
+mod poses;
 mod register;
 mod rrd;
 mod scale;
 mod skeleton;
 mod statistics;
 mod summary;
-mod transform;
 mod view;
 mod watch;
 mod weights;
@@ -49,7 +47,8 @@ pub struct Cli {
 enum Command {
     Register(Box<register::RegisterArgs>),
     Inspect(inspect::InspectArgs),
-    Batch(batch::BatchArgs),
+    Batch(Box<batch::BatchArgs>),
+    Summary(batch::SummaryArgs),
     Align(Box<align::AlignArgs>),
     View(view::ViewArgs),
     Corrupt(CorruptArgs),
@@ -85,6 +84,7 @@ pub fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Command::Register(args) => register::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Batch(args) => batch::run(&args),
+        Command::Summary(args) => batch::summary(&args),
         Command::Align(args) => align::run(&args),
         Command::View(args) => view::run(&args),
         Command::Corrupt(args) => corrupt(&args),

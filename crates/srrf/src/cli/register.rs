@@ -8,17 +8,18 @@ use clap::Args;
 use srrf::{Outcome, Registrar, Request, Stage, StageTime};
 use srrf_cloud::Rigid;
 use srrf_cloud::io::Kept;
+use srrf_cloud::pose::PoseNote;
 
-use super::common::{EXIT_CODES, failed, left_out, to_json, unusable};
+use super::common::{EXIT_CODES, answer, failed, left_out, unusable};
 use super::method::MethodArgs;
 use super::page::{self, PageArgs};
+use super::poses::{PoseReading, PoseWriting, described, looks_inverted};
 use super::scale::{self, ScaleArgs};
 use super::watch::Watch;
-use super::{rrd, summary, transform};
-use srrf_args::Failure;
+use super::{rrd, summary};
 use srrf_args::files::{self, Input};
 use srrf_args::flags::Common;
-use srrf_args::{Output, Progress};
+use srrf_args::{Failure, Output, OutputKind, Places, Progress};
 
 /// The exit code of an answer that is probably wrong.
 const ABSTAINED: u8 = 3;
@@ -36,7 +37,7 @@ pub struct RegisterArgs {
     /// The cloud to lay it on, or `-`
     target: PathBuf,
 
-    /// Write the pose: 4 rows of 4, which `numpy.loadtxt` reads
+    /// Write the pose, in the format that the name says: 4 rows of 4 (.txt), .json, .npy, .tum, .kitti, .ros
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 
@@ -60,9 +61,19 @@ pub struct RegisterArgs {
     #[arg(long, value_name = "FILE")]
     rrd: Option<PathBuf>,
 
-    /// A first guess: a file of the same kind as `--output` writes
+    /// A first guess: a file of any kind that `--output` writes, or the JSON of an answer
     #[arg(long, value_name = "FILE")]
     initial: Option<PathBuf>,
+
+    /// Write nothing where the answer is `abstain`; the exit code is 3 as always then
+    #[arg(long)]
+    require_answer: bool,
+
+    #[command(flatten)]
+    writing: PoseWriting,
+
+    #[command(flatten)]
+    reading: PoseReading,
 
     #[command(flatten)]
     method: MethodArgs,
@@ -93,7 +104,8 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
     let begun = Instant::now();
     let out = args.check()?;
     args.common.threads.start()?;
-    let initial = args.initial.as_deref().map(transform::read).transpose()?;
+    let guess = args.initial.as_deref().map(|path| args.reading.read(path)).transpose()?;
+    let initial = guess.as_ref().map(|guess| guess.target_from_source);
     let progress = args.common.progress();
     progress.step(format!("reading {:?} and {:?}, loading the network", args.source, args.target));
     // The network loads while the files are read.
@@ -111,10 +123,16 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
     scale::applied(&outcome, &mut source)?;
     outcome.times.insert(0, StageTime { stage: Stage::Open, seconds: opened });
     outcome.warnings.extend([&source, &target].into_iter().filter_map(left_out));
+    outcome.warnings.extend(initial.and_then(|pose| looks_inverted(&pose, &source.cloud, &target.cloud)));
 
-    let written = args.write(&outcome, &source, &target, initial.as_ref(), &progress)?;
+    let written = if outcome.abstain && args.require_answer {
+        vec!["--require-answer: nothing was written".to_owned()]
+    } else {
+        args.write(&outcome, &source, &target, initial.as_ref(), &progress)?
+    };
     progress.clear();
     if out != Output::Quiet {
+        guess.iter().for_each(|guess| out.say(&described("--initial", guess)));
         out.say(&summary::text(&outcome, &source, &target, begun.elapsed().as_secs_f64()));
         written.iter().for_each(|line| out.say(line));
     }
@@ -124,24 +142,23 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
 impl RegisterArgs {
     /// Checks what can be checked before any work, and finds where to speak.
     fn check(&self) -> Result<Output, Failure> {
-        if files::is_stream(&self.source) && files::is_stream(&self.target) {
-            return Err(Failure::usage(
-                "both clouds are `-`: standard input holds one; name a file for the other".into(),
-            ));
-        }
         self.rrd.as_deref().map_or(Ok(()), rrd::check)?;
-        let outputs = [&self.output, &self.save, &self.json, &self.html, &self.png, &self.rrd];
-        outputs.into_iter().flatten().try_for_each(|path| files::check_output(path))?;
-        if let Some(path) = &self.save {
-            files::check_cloud_output(path)?;
-        }
-        let streams = outputs.into_iter().flatten().filter(|path| files::is_stream(path)).count();
-        if streams > 1 {
-            return Err(Failure::usage(format!(
-                "{streams} results are to go to `-`: standard output takes one; name files for the others"
-            )));
-        }
-        Ok(Output::new(self.common.quiet.quiet, streams > 0))
+        let weights = self.method.weights.weights.as_deref().map(Path::new).filter(|path| path.is_file());
+        let places = Places::new()
+            .reads("the source", &*self.source)
+            .reads("the target", &*self.target)
+            .reads("--initial", self.initial.as_deref())
+            .reads("--weights", weights);
+        let places = self
+            .writing
+            .among(places, "--output", self.output.as_deref())?
+            .writes_cloud("--save", self.save.as_deref())?
+            .writes("--json", self.json.as_deref(), OutputKind::JSON)?
+            .writes("--html", self.html.as_deref(), OutputKind::PAGE)?
+            .writes("--png", self.png.as_deref(), OutputKind::PNG)?
+            .writes("--rrd", self.rrd.as_deref(), OutputKind::RECORDING)?;
+        places.check()?;
+        Ok(Output::new(self.common.quiet.quiet, places.takes_standard_output()))
     }
 
     fn read(&self) -> Result<(Input, Input), Failure> {
@@ -165,8 +182,10 @@ impl RegisterArgs {
         let begin = |path: &Path| progress.step(format!("writing {path:?}"));
         if let Some(path) = &self.output {
             begin(path);
-            files::write(path, transform::to_text(pose).as_bytes())?;
-            lines.push(wrote(path, "the pose"));
+            let note = PoseNote { abstain: outcome.abstain, probability: Some(outcome.probability.get()) };
+            self.writing.write(path, pose, &note)?;
+            let what = if outcome.abstain { "the pose, with the word abstain" } else { "the pose" };
+            lines.push(wrote(path, what));
         }
         if let Some(path) = &self.save {
             begin(path);
@@ -189,8 +208,9 @@ impl RegisterArgs {
         }
         if let Some(path) = &self.json {
             begin(path);
-            let value = to_json(outcome, &source.name, &target.name, [source.dropped, target.dropped]);
-            files::write(path, format!("{value:#}\n").as_bytes())?;
+            let found = answer(outcome, &source.name, &target.name, [source.dropped, target.dropped]);
+            let text = serde_json::to_string_pretty(&found).map_err(Failure::other)?;
+            files::write(path, format!("{text}\n").as_bytes())?;
             lines.push(wrote(path, "all figures"));
         }
         if let Some(path) = &self.html {

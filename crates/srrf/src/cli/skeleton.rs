@@ -1,18 +1,16 @@
 //! `srrf skeleton`: the skeleton of a cloud as a PLY file.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use srrf::FoundSkeleton;
 
 use super::common::{failed, left_out};
-use srrf_args::Failure;
-use srrf_args::Output;
-use srrf_args::files;
 use srrf_args::flags::{Common, Device, Weights, value};
 use srrf_args::words::count;
+use srrf_args::{Failure, Output, OutputKind, Places, files};
 
 /// Write the skeleton that the network sees in a cloud: centres and radii of spheres along its middle.
 ///
@@ -48,7 +46,9 @@ pub fn run(args: &SkeletonArgs) -> Result<ExitCode, Failure> {
     let Some(output) = args.output.as_ref().or(args.to.as_ref()) else {
         return Err(Failure::usage("name the file to write: --output FILE".into()));
     };
-    files::check_output(output)?;
+    let weights = args.weights.weights.as_deref().map(Path::new).filter(|path| path.is_file());
+    let places = Places::new().reads("the cloud", &*args.input).reads("--weights", weights);
+    places.writes("--output", &**output, OutputKind::PLY)?.check()?;
     args.common.threads.start()?;
     let input = files::read_solid(&args.input, None)?;
     let found = srrf::skeleton(&input.cloud, args.weights.weights.as_deref(), &args.device.device)

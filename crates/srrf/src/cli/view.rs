@@ -7,11 +7,9 @@ use clap::Args;
 use srrf_view::Pose;
 
 use super::page::{self, PageArgs};
-use super::transform;
-use srrf_args::Failure;
-use srrf_args::Output;
-use srrf_args::files;
+use super::poses::{PoseReading, described, looks_inverted};
 use srrf_args::flags::Common;
+use srrf_args::{Failure, Output, OutputKind, Places, files};
 
 /// Write a page that shows two clouds, and a pose between them if one is given.
 ///
@@ -24,9 +22,12 @@ pub struct ViewArgs {
     /// The target, or `-`
     target: PathBuf,
 
-    /// A pose that maps source to target: 4 rows of 4, as `srrf register -o` writes it
+    /// A pose that maps source to target: 4 rows of 4, or any other kind that `srrf register -o` writes
     #[arg(long, value_name = "FILE")]
     transform: Option<PathBuf>,
+
+    #[command(flatten)]
+    reading: PoseReading,
 
     /// The page to write
     #[arg(short, long, value_name = "FILE", required_unless_present = "png")]
@@ -48,25 +49,28 @@ pub struct ViewArgs {
 /// # Errors
 /// [`Failure`], with its exit code.
 pub fn run(args: &ViewArgs) -> Result<ExitCode, Failure> {
-    if files::is_stream(&args.source) && files::is_stream(&args.target) {
-        return Err(Failure::usage(
-            "both clouds are `-`: standard input holds one; name a file for the other".into(),
-        ));
-    }
-    let outputs = [&args.output, &args.png];
-    outputs.into_iter().flatten().try_for_each(|path| files::check_output(path))?;
-    let streams = outputs.into_iter().flatten().filter(|path| files::is_stream(path)).count();
-    if streams > 1 {
-        return Err(Failure::usage("both results are to go to `-`: standard output takes one".into()));
-    }
+    let places = Places::new()
+        .reads("the source", &*args.source)
+        .reads("the target", &*args.target)
+        .reads("--transform", args.transform.as_deref())
+        .writes("--output", args.output.as_deref(), OutputKind::PAGE)?
+        .writes("--png", args.png.as_deref(), OutputKind::PNG)?;
+    places.check()?;
+    let out = Output::new(args.common.quiet.quiet, places.takes_standard_output());
     args.common.threads.start()?;
-    let pose = args.transform.as_deref().map(transform::read).transpose()?;
+    let pose = args.transform.as_deref().map(|path| args.reading.read(path)).transpose()?;
     let progress = args.common.progress();
     progress.step(format!("reading {:?} and {:?}", args.source, args.target));
     let (source, target) = (files::read(&args.source, None)?, files::read(&args.target, None)?);
     let mut pair = args.page.pair(&source, &target);
-    if let Some(pose) = pose {
-        pair = pair.pose(Pose::new("given", pose));
+    if let Some(pose) = &pose {
+        out.say(&described("--transform", pose));
+        let name = if pose.abstained { "given, abstained" } else { "given" };
+        pair = pair.pose(Pose::new(name, pose.target_from_source));
+        if let Some(warning) = looks_inverted(&pose.target_from_source, &source.cloud, &target.cloud) {
+            out.say(&format!("warning: {warning}"));
+            pair = pair.warning(warning.to_string());
+        }
     }
     let mut lines = Vec::new();
     if let Some(path) = &args.png {
@@ -80,7 +84,6 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode, Failure> {
         lines.push(format!("wrote {}: open it in a browser", path.display()));
     }
     progress.clear();
-    let out = Output::new(args.common.quiet.quiet, streams > 0);
     lines.iter().for_each(|line| out.say(line));
     Ok(ExitCode::SUCCESS)
 }

@@ -7,9 +7,8 @@ use clap::{Args, Subcommand};
 use srrf_model::weights::{LoadedModel, with_config};
 use srrf_model::{SrrfConfig, device, embedded};
 
-use srrf_args::Failure;
-use srrf_args::files;
 use srrf_args::words::count;
+use srrf_args::{Failure, OutputKind, Places, files};
 
 /// List the models in the program, show their cards, check files of weights.
 #[derive(Debug, Args)]
@@ -96,16 +95,9 @@ fn show_config(name: &str) -> Result<String, Failure> {
 
 /// Writes the weights `name` with the configuration of a file.
 fn write(name: &str, used_as: &Path, output: &Path) -> Result<Option<String>, Failure> {
-    files::check_output(output)?;
-    let place = |path: &Path| std::fs::canonicalize(path).ok();
-    if place(output)
-        .is_some_and(|out| place(used_as) == Some(out.clone()) || place(Path::new(name)) == Some(out))
-    {
-        return Err(Failure::usage(format!(
-            "{}: is read as well; choose another --output",
-            output.display()
-        )));
-    }
+    let of_file = Some(Path::new(name)).filter(|path| path.is_file());
+    let places = Places::new().reads("the weights", of_file).reads("--used-as", used_as);
+    places.writes("--output", output, OutputKind::WEIGHTS)?.check()?;
     let input = |source: std::io::Error, path: &Path| {
         Failure::usage(format!("{}: {source}", path.display())).because(source)
     };

@@ -1,9 +1,10 @@
 //! [`AppliedScale`]: what a source was multiplied by.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Where the factor of a source comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ScaleOrigin {
     /// Units that were given.
@@ -16,7 +17,7 @@ pub enum ScaleOrigin {
 
 /// A factor by which the coordinates of the source were multiplied before its pose was found:
 /// `target ~ R (factor * source) + t`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct AppliedScale {
     /// The factor.
     pub factor: f64,

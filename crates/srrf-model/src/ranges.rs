@@ -1,4 +1,4 @@
-//! The one check of every number of a configuration: the ranges that stand beside the fields, as `#[schemars(range(..))]`
+//! The one check of every number of a configuration, of a training or in the header of weights: the ranges that stand beside the fields, as `#[schemars(range(..))]`
 //! and its kin, against the resolved values. A fraction without a range must still be a finite number.
 
 use schemars::Schema;
@@ -6,19 +6,19 @@ use serde_json::Value as Json;
 use toml::Value;
 
 /// The first value out of its range, with its key and what it must be.
-pub(crate) fn out_of_range(schema: &Schema, value: &Value) -> Option<(String, String)> {
+pub fn out_of_range(schema: &Schema, value: &Value) -> Option<(String, String)> {
     let root = schema.as_value();
     Walk { root }.first_wrong(root, value, "")
 }
 
 /// The part of `root` that a schema points to, or the schema itself.
-pub(crate) fn resolved<'a>(root: &'a Json, schema: &'a Json) -> &'a Json {
+pub fn resolved<'a>(root: &'a Json, schema: &'a Json) -> &'a Json {
     let name = schema.get("$ref").and_then(Json::as_str).and_then(|path| path.strip_prefix('#'));
     name.and_then(|path| root.pointer(path)).unwrap_or(schema)
 }
 
 /// The range of a schema in words, such as `0 to 1`; none where there is none.
-pub(crate) fn range_of(schema: &Json) -> Option<String> {
+pub fn range_of(schema: &Json) -> Option<String> {
     let number = |key: &str| schema.get(key).and_then(Json::as_f64);
     let least = number("minimum");
     let most = number("maximum");
@@ -34,7 +34,7 @@ pub(crate) fn range_of(schema: &Json) -> Option<String> {
 }
 
 /// A number without an exponent where it is short.
-pub(crate) fn plain(value: f64) -> String {
+fn plain(value: f64) -> String {
     if value != 0.0 && (value.abs() < 1e-4 || value.abs() >= 1e9) {
         format!("{value:e}")
     } else {
