@@ -2,6 +2,7 @@
 
 use srrf_cloud::Rigid;
 use srrf_cloud::io::{CloudFile, IoError};
+use srrf_cloud::pose::{PoseFile, PoseFormat, PoseNote, QuaternionOrder};
 
 /// Names of the parsers, one fuzzer each.
 pub const FORMATS: [&str; 12] =
@@ -38,5 +39,29 @@ pub fn check(format: Option<&str>, bytes: &[u8]) {
         );
         let same = |(a, b): (&f64, &f64)| a == b || (a.is_nan() && b.is_nan());
         assert!(!still || read.iter().flatten().zip(points.iter().flatten()).all(same), "other points");
+    }
+}
+
+/// Reads `bytes` as a pose. Where that gives one, it is a rotation, and a file of every format gives it back.
+///
+/// # Panics
+/// Where the parser does not keep its promises.
+pub fn check_pose(bytes: &[u8]) {
+    for order in [None, Some(QuaternionOrder::Wxyz)] {
+        let Ok(read) = PoseFile::parse(bytes, order) else { continue };
+        let pose = read.target_from_source;
+        assert!(pose.rotation.iter().chain(&pose.translation).all(|v| v.is_finite()), "not finite: {pose:?}");
+        let off = (pose.rotation.transpose() * pose.rotation - nalgebra::Matrix3::identity()).abs().max();
+        assert!(off < 1e-8 && pose.rotation.determinant() > 0.0, "no rotation: {pose:?}");
+        for format in PoseFormat::ALL {
+            let note = PoseNote { abstain: true, probability: Some(0.5) };
+            let Ok(written) = format.write(&pose, &note) else { panic!("{format:?}: not written") };
+            let again = PoseFile::parse(&written, None).unwrap_or_else(|e| panic!("{format:?}: {e}"));
+            let turned = (again.target_from_source.rotation - pose.rotation).abs().max();
+            let far = (again.target_from_source.translation - pose.translation).abs().max();
+            let most = pose.translation.abs().max();
+            assert!(turned < 1e-7 && far <= 1e-12 * most, "{format:?}: {pose:?} became {again:?}");
+            assert!(again.abstained || format == PoseFormat::Npy, "{format:?}");
+        }
     }
 }
