@@ -5,7 +5,7 @@ use std::fmt;
 use std::process::ExitCode;
 
 use srrf_cloud::CloudError;
-use srrf_cloud::io::IoError;
+use srrf_cloud::io::{FormatError, IoError};
 
 use crate::exit::{FAILED, USAGE};
 
@@ -80,6 +80,7 @@ impl From<IoError> for Failure {
             }
             IoError::Read { .. } => "; check what it is and who may read it",
             IoError::Write { .. } => "; choose another place or format for the output",
+            IoError::Format { source: FormatError::Unclear { .. } | FormatError::Memory { .. }, .. } => "",
             IoError::Format { .. } => {
                 "; is the file complete, and of the format that its name says? Write it again, or convert it to PLY"
             }

@@ -2,9 +2,11 @@
 
 use std::fs::File;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use srrf_cloud::io::{CloudFile, IoError, Kept, write_atomically, write_cloud, write_cloud_to};
+use srrf_cloud::io::{
+    CloudFile, Contents, IoError, Kept, Note, ReadOptions, write_atomically, write_cloud, write_cloud_to,
+};
 use srrf_cloud::{CloudError, PointCloud, Rigid, Solid};
 
 use crate::failure::Failure;
@@ -21,6 +23,16 @@ pub struct Input {
     pub cloud: PointCloud,
     /// Points left out because a coordinate is NaN or infinite.
     pub dropped: usize,
+    /// Triangles of a mesh, as indices of the points of `cloud`; empty for clouds.
+    pub faces: Vec<[u32; 3]>,
+    /// Whether the file holds its coordinates in single precision.
+    pub single: bool,
+    /// Where the scanner stood, where the file says it.
+    pub viewpoint: Option<[f64; 3]>,
+    /// Width and height of an organised file, the points counted that were left out.
+    pub grid: Option<[usize; 2]>,
+    /// What a user should know of the reading.
+    pub notes: Vec<Note>,
 }
 
 /// Whether a path stands for standard input or output.
@@ -28,44 +40,41 @@ pub fn is_stream(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// Reads a cloud. `format` is for streams.
+/// Reads a cloud. `format` is for streams; `options` are for files that do not say how they are read.
 ///
 /// # Errors
 /// [`Failure::usage`], which names the file.
-pub fn read(path: &Path, format: Option<&str>) -> Result<Input, Failure> {
+pub fn read(path: &Path, format: Option<&str>, options: ReadOptions) -> Result<Input, Failure> {
     let file = match (is_stream(path), format) {
-        (true, format) => CloudFile::from_reader(&mut io::stdin().lock(), format)?,
-        (false, None) => CloudFile::open(path)?,
+        (true, format) => CloudFile::from_reader_with(&mut io::stdin().lock(), format, options)?,
+        (false, None) => CloudFile::open_with(path, options)?,
         (false, Some(format)) => {
             return Err(Failure::usage(format!(
                 "{path:?} is a file, whose name or content says its format; `{format}` can be asked for streams only"
             )));
         }
     };
-    let (cloud, dropped) = match file.cloud_dropping_nan() {
-        Err(IoError::Cloud { path, source: CloudError::Empty }) => return Err(nothing_left(&file, path)),
-        read => read?,
-    };
-    Ok(Input { name: path.display().to_string(), file, cloud, dropped })
-}
-
-/// No point is there, or none that is finite.
-fn nothing_left(file: &CloudFile, path: PathBuf) -> Failure {
-    match file.points() {
-        Ok(points) => Failure::usage(format!(
-            "{path:?}: each of its {} points has a coordinate that is NaN or infinite; write the file again with numbers",
-            points.len()
+    let name = path.display().to_string();
+    let mut contents = file.contents()?;
+    let grid = contents.grid;
+    let dropped = contents.drop_not_finite();
+    let Contents { points, faces, single, viewpoint, notes, .. } = contents;
+    let cloud = PointCloud::new(points).map_err(|error| match error {
+        CloudError::Empty => Failure::usage(format!(
+            "{name:?}: each of its {dropped} points has a coordinate that is NaN or infinite; write the file again with \
+             numbers"
         )),
-        Err(_) => IoError::Cloud { path, source: CloudError::Empty }.into(),
-    }
+        other => Failure::cloud(&name, &other),
+    })?;
+    Ok(Input { name, file, cloud, dropped, faces, single, viewpoint, grid, notes })
 }
 
 /// As [`read`], of a cloud that determines a rotation.
 ///
 /// # Errors
 /// As [`read`]; also for fewer than three points and for points on one line.
-pub fn read_solid(path: &Path, format: Option<&str>) -> Result<Input, Failure> {
-    let input = read(path, format)?;
+pub fn read_solid(path: &Path, format: Option<&str>, options: ReadOptions) -> Result<Input, Failure> {
+    let input = read(path, format, options)?;
     Solid::new(&input.cloud).map_err(|e| Failure::cloud(&input.name, &e))?;
     Ok(input)
 }

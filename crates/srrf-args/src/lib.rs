@@ -16,6 +16,7 @@ mod output;
 mod places;
 mod program;
 mod progress;
+pub mod reading;
 mod scripts;
 pub mod words;
 

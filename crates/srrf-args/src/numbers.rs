@@ -29,6 +29,30 @@ pub fn real(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clo
     }
 }
 
+/// A size of memory in bytes, such as `500M`, `4G`, `1.5GB` or `2GiB`.
+///
+/// # Errors
+/// What is expected.
+pub fn bytes(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let digits = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let (number, unit) = text.split_at(digits);
+    let factor = match unit.to_ascii_lowercase().as_str() {
+        "" | "b" => Some(1.0),
+        "k" | "kb" => Some(1e3),
+        "m" | "mb" => Some(1e6),
+        "g" | "gb" => Some(1e9),
+        "t" | "tb" => Some(1e12),
+        "kib" => Some(1024.0),
+        "mib" => Some(1024.0 * 1024.0),
+        "gib" => Some(1024.0 * 1024.0 * 1024.0),
+        _ => None,
+    };
+    let size = factor.and_then(|factor| Some(number.trim().parse::<f64>().ok()? * factor));
+    let size = size.filter(|size| (1.0..=1e18).contains(size)).map(|size| size as u64);
+    size.ok_or_else(|| "expected a size of memory, such as 500M, 4G or 8GiB".into())
+}
+
 /// One entry of a list, whose entries are apart by commas.
 ///
 /// # Errors
@@ -61,6 +85,18 @@ mod tests {
         assert_eq!(minutes("0.25"), Ok(0.25));
         for text in ["nan", "1e300", "-1", "inf", "soon"] {
             assert_eq!(minutes(text), Err("expected a number from 0 to 525,600".into()), "{text}");
+        }
+    }
+
+    #[test]
+    fn sizes_of_memory() {
+        for (text, size) in
+            [("1000", 1000), ("500M", 500_000_000), ("1.5 gb", 1_500_000_000), ("2GiB", 2 << 30)]
+        {
+            assert_eq!(bytes(text), Ok(size), "{text}");
+        }
+        for text in ["", "0", "-1G", "4X", "nan", "1e30G", "G"] {
+            assert!(bytes(text).unwrap_err().contains("such as 500M"), "{text}");
         }
     }
 

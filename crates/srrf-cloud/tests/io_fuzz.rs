@@ -4,6 +4,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "tests")]
 
+#[allow(dead_code, reason = "each test uses its part")]
 #[path = "../../../fuzz/src/lib.rs"]
 mod check;
 mod samples;

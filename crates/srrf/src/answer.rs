@@ -206,7 +206,7 @@ pub enum AnswerOrError {
     /// A pose was found.
     Found(Box<Answer>),
     /// None was.
-    None(NoAnswer),
+    None(Box<NoAnswer>),
 }
 
 /// The JSON Schema of [`AnswerOrError`], as `schemas/srrf-register-1.schema.json` in the repository holds it.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use serde::{Serialize, Serializer};
 use srrf_cloud::RegisterError;
+use srrf_cloud::io::Note;
 
 use crate::options::Method;
 use crate::probability::Probability;
@@ -47,6 +48,13 @@ pub enum Warning {
         cloud: String,
         /// How many.
         points: usize,
+    },
+    /// What a user should know of how a file was read.
+    Reading {
+        /// Name of the cloud.
+        cloud: String,
+        /// What.
+        note: Note,
     },
 }
 
@@ -97,6 +105,7 @@ impl fmt::Display for Warning {
                 };
                 write!(f, "{cloud}: {points} {were} left out.")
             }
+            Self::Reading { cloud, note } => write!(f, "{cloud}: {note}."),
         }
     }
 }
@@ -117,6 +126,9 @@ mod tests {
         let left = |points| Warning::LeftOut { cloud: "a.ply".into(), points }.to_string();
         assert_eq!(left(1), "a.ply: 1 point with NaN or infinity was left out.");
         assert_eq!(left(2), "a.ply: 2 points with NaN or infinity were left out.");
+        let note = Note::ExtraBytes { bytes: 2 };
+        let reading = Warning::Reading { cloud: "a.stl".into(), note }.to_string();
+        assert_eq!(reading, "a.stl: passed over 2 bytes behind the end.");
         let doubtful = Warning::Doubtful { probability: Probability::new(0.123).unwrap() };
         assert!(
             doubtful.to_string().starts_with("The pose is right with a probability of 12% only: check it")

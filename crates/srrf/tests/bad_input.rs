@@ -88,7 +88,7 @@ fn options_that_make_no_sense() {
         assert!(done.code == 2 && done.err.starts_with("error: "), "{done:?}");
         assert!(done.err.contains(&format!("--{name} <N>")) && done.err.contains(words), "{done:?}");
     }
-    says(&register(&["--format-source", "pcd"]), 2, &["source.ply", "streams only"]);
+    says(&register(&["--source-format", "pcd"]), 2, &["source.ply", "streams only"]);
     for bad in [&["--method", "magic"][..], &["--rotation", "90"], &["--seed", "-1"], &["--nonsense"]] {
         let done = register(bad);
         assert!(done.code == 2 && done.err.starts_with("error: "), "{done:?}");

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::memory::in_words;
 use crate::CloudError;
 
 /// Why the bytes of a file are not a cloud.
@@ -26,6 +27,29 @@ pub enum FormatError {
     /// The content cannot be understood, or is of a kind that is not supported.
     #[error("{0}")]
     Content(String),
+    /// The content can be read in several ways, or in none that the program knows: the user has to say which.
+    #[error("{problem}; say which with `{switch}`")]
+    Unclear {
+        /// What there is.
+        problem: String,
+        /// The flag of the programs that answers; the field of [`ReadOptions`](super::ReadOptions) of the same name.
+        switch: &'static str,
+    },
+    /// Reading would take more memory than is allowed.
+    #[error(
+        "{what}: reading takes {} of memory, and {} are allowed; allow more with `--max-memory`, or make the file \
+         smaller first",
+        in_words(*needed),
+        in_words(*limit)
+    )]
+    Memory {
+        /// What takes it.
+        what: String,
+        /// How many bytes.
+        needed: u64,
+        /// How many bytes are allowed.
+        limit: u64,
+    },
     /// The format cannot hold what is to be written.
     #[error("{0}")]
     Unwritable(String),

@@ -4,7 +4,8 @@ use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use super::{CloudFormat, FORMATS, FormatError, IoError, write_atomically};
+use super::write_atomically;
+use super::{Attribute, CloudFormat, Contents, FORMATS, FormatError, IoError, ReadOptions, ScanEntry};
 use crate::{CloudError, PointCloud, Rigid};
 
 /// Formats that need a cargo feature of the same name, and the extensions of their files.
@@ -29,6 +30,7 @@ pub struct CloudFile {
     path: PathBuf,
     bytes: Vec<u8>,
     format: &'static dyn CloudFormat,
+    options: ReadOptions,
 }
 
 impl CloudFile {
@@ -38,16 +40,34 @@ impl CloudFile {
     /// # Errors
     /// [`IoError::Read`], [`IoError::UnknownFormat`], [`IoError::LeftOut`].
     pub fn open(path: &Path) -> Result<Self, IoError> {
+        Self::open_with(path, ReadOptions::default())
+    }
+
+    /// As [`open`](Self::open), to be read with `options`. `file.ext#2` is scan 2 of `file.ext`, unless a file has
+    /// that very name.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open); [`IoError::Format`] where the file is larger than the memory that it may take.
+    pub fn open_with(path: &Path, mut options: ReadOptions) -> Result<Self, IoError> {
+        let mut path = path;
+        let parts = scan_of(path);
+        if let Some((file, number)) = &parts {
+            path = file;
+            options.scan = Some(*number);
+        }
         let known = format_of(path);
         if let Err(left_out @ IoError::LeftOut { .. }) = known {
             return Err(left_out);
         }
-        let bytes = fs::read(path).map_err(|source| IoError::Read { path: path.to_owned(), source })?;
+        let unread = |source| IoError::Read { path: path.to_owned(), source };
+        let file = fs::File::open(path).map_err(unread)?;
+        let length = file.metadata().map_err(unread)?.len();
+        let bytes = read_within(file, length, path, &options)?;
         let format = match known {
             Ok(format) => format,
             Err(_) => detect(path, &bytes)?,
         };
-        Ok(Self { path: path.to_owned(), bytes, format })
+        Ok(Self { path: path.to_owned(), bytes, format, options })
     }
 
     /// Reads a stream to its end. `format` is the name or an extension of its format; without it the
@@ -56,17 +76,26 @@ impl CloudFile {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn from_reader(reader: &mut dyn Read, format: Option<&str>) -> Result<Self, IoError> {
+        Self::from_reader_with(reader, format, ReadOptions::default())
+    }
+
+    /// As [`from_reader`](Self::from_reader), to be read with `options`.
+    ///
+    /// # Errors
+    /// As [`open_with`](Self::open_with).
+    pub fn from_reader_with(
+        reader: &mut dyn Read,
+        format: Option<&str>,
+        options: ReadOptions,
+    ) -> Result<Self, IoError> {
         let format = format.map(named).transpose()?;
         let path = PathBuf::from("-");
-        let mut bytes = Vec::new();
-        if let Err(source) = reader.read_to_end(&mut bytes) {
-            return Err(IoError::Read { path, source });
-        }
+        let bytes = read_within(reader, 0, &path, &options)?;
         let format = match format {
             Some(format) => format,
             None => detect(&path, &bytes)?,
         };
-        Ok(Self { path, bytes, format })
+        Ok(Self { path, bytes, format, options })
     }
 
     /// The name of the format.
@@ -79,16 +108,55 @@ impl CloudFile {
         &self.path
     }
 
+    /// What the file is read with.
+    pub fn options(&self) -> &ReadOptions {
+        &self.options
+    }
+
+    /// All that the file holds; one point at least.
+    ///
+    /// # Errors
+    /// [`IoError::Format`], [`IoError::OtherFormat`], and [`IoError::Cloud`] where there are no points.
+    pub fn contents(&self) -> Result<Contents, IoError> {
+        let contents = self.read().map_err(|source| self.error(source))?;
+        if contents.points.is_empty() {
+            return Err(IoError::Cloud { path: self.path.clone(), source: CloudError::Empty });
+        }
+        Ok(contents)
+    }
+
     /// All points, in the order of the file; shape `[n, 3]`, n > 0, any numbers.
     ///
     /// # Errors
-    /// [`IoError::Format`], [`IoError::OtherFormat`], and [`IoError::Cloud`] where there are none.
+    /// As [`contents`](Self::contents).
     pub fn points(&self) -> Result<Vec<[f64; 3]>, IoError> {
-        let points = self.format.read(&self.bytes).map_err(|source| self.error(source))?;
-        if points.is_empty() {
-            return Err(IoError::Cloud { path: self.path.clone(), source: CloudError::Empty });
+        Ok(self.contents()?.points)
+    }
+
+    /// The scans of the file, one or more; whichever of them the options name.
+    ///
+    /// # Errors
+    /// As [`contents`](Self::contents).
+    pub fn scans(&self) -> Result<Vec<ScanEntry>, IoError> {
+        self.format.scans(&self.bytes, &self.options).map_err(|source| self.error(source))
+    }
+
+    /// What the points have besides their place.
+    ///
+    /// # Errors
+    /// As [`contents`](Self::contents).
+    pub fn attributes(&self) -> Result<Vec<Attribute>, IoError> {
+        self.format.attributes(&self.bytes, &self.options).map_err(|source| self.error(source))
+    }
+
+    fn read(&self) -> Result<Contents, FormatError> {
+        match self.options.scan {
+            Some(number) if number != 1 && !self.format.holds_scans() => Err(FormatError::Content(format!(
+                "scan {number} is asked for, and a file of the format {} holds one; leave the number out",
+                self.format.name()
+            ))),
+            _ => self.format.read(&self.bytes, &self.options),
         }
-        Ok(points)
     }
 
     /// The cloud.
@@ -157,10 +225,10 @@ impl CloudFile {
         out: &mut dyn Write,
     ) -> io::Result<Kept> {
         if format.name() == self.format.name() {
-            format.rewrite(&self.bytes, motion, out)?;
+            format.rewrite(&self.bytes, &self.options, motion, out)?;
             return Ok(Kept::Everything);
         }
-        let mut points = self.format.read(&self.bytes)?;
+        let mut points = self.read()?.points;
         points.iter_mut().for_each(|point| *point = super::scan::moved(motion, *point));
         format.write(&points, out)?;
         Ok(Kept::Points)
@@ -175,6 +243,9 @@ impl CloudFile {
         let path = self.path.clone();
         let found = FORMATS.iter().find(|format| format.recognises(&self.bytes)).map(|format| format.name());
         match found {
+            _ if matches!(source, FormatError::Memory { .. } | FormatError::Unclear { .. }) => {
+                IoError::Format { path, source }
+            }
             Some(found) if found != self.format.name() => {
                 IoError::OtherFormat { path, asked: self.format.name(), found, source }
             }
@@ -203,6 +274,35 @@ impl std::fmt::Debug for CloudFile {
             .field("bytes", &bytes)
             .finish()
     }
+}
+
+/// The file and the scan of a name such as `file.e57#2`, where no file has that very name.
+fn scan_of(path: &Path) -> Option<(PathBuf, usize)> {
+    let name = path.file_name()?.to_str()?;
+    let (file, number) = name.rsplit_once('#')?;
+    let file = path.with_file_name(file);
+    let number = number.parse().ok()?;
+    (!path.exists() && file.is_file()).then_some((file, number))
+}
+
+/// All bytes, about `length` of them, as far as they are allowed to take memory.
+fn read_within(
+    reader: impl Read,
+    length: u64,
+    path: &Path,
+    options: &ReadOptions,
+) -> Result<Vec<u8>, IoError> {
+    let check = |length: u64| {
+        let length = usize::try_from(length).unwrap_or(usize::MAX);
+        let checked = options.check_memory("the file alone", 0, length);
+        checked.map(|()| length).map_err(|source| IoError::Format { path: path.to_owned(), source })
+    };
+    let mut bytes = Vec::with_capacity(check(length)?.saturating_add(1));
+    if let Err(source) = reader.take(options.memory().saturating_add(1)).read_to_end(&mut bytes) {
+        return Err(IoError::Read { path: path.to_owned(), source });
+    }
+    check(bytes.len() as u64)?;
+    Ok(bytes)
 }
 
 /// The format that the extension of `path` says.

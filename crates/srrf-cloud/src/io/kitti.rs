@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use super::scan::{Splice, moved};
 use super::single::check_single;
-use super::{CloudFormat, FormatError};
+use super::{CloudFormat, Contents, FormatError, ReadOptions};
 use crate::Rigid;
 
 /// Bytes of a point.
@@ -27,7 +27,7 @@ impl CloudFormat for Kitti {
         false // any bytes could be numbers
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
         if !bytes.len().is_multiple_of(RECORD) {
             let five = if bytes.len().is_multiple_of(20) {
                 " (records of 20 bytes would fit: nuScenes?)"
@@ -40,7 +40,9 @@ impl CloudFormat for Kitti {
                 bytes.len()
             )));
         }
-        Ok(bytes.as_chunks::<RECORD>().0.iter().map(point).collect())
+        options.check_points(bytes.len(), bytes.len() / RECORD)?;
+        let points = bytes.as_chunks::<RECORD>().0.iter().map(point).collect();
+        Ok(Contents { points, single: true, ..Contents::default() })
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
@@ -52,8 +54,14 @@ impl CloudFormat for Kitti {
         })
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-        let old = self.read(bytes)?;
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
+        let old = self.read(bytes, options)?.points;
         let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
         check_single(&new, "KITTI .bin")?;
         let mut splice = Splice::new(bytes, out);
@@ -75,6 +83,7 @@ fn point(record: &[u8; RECORD]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::testing::{moved_copy, points_of};
 
     #[test]
     fn records_of_four_floats() {
@@ -82,17 +91,17 @@ mod tests {
         for value in [1.5f32, -2.0, 0.1, 0.75, 4.0, f32::NAN, 1e-40, 0.5] {
             bytes.extend(value.to_le_bytes());
         }
-        let points = Kitti.read(&bytes).unwrap();
+        let points = points_of(&Kitti, &bytes).unwrap();
         assert_eq!(points[0], [1.5, -2.0, f64::from(0.1f32)]);
         assert!(points[1][1].is_nan());
         let mut copy = Vec::new();
-        Kitti.rewrite(&bytes, &Rigid::identity(), &mut copy).unwrap();
+        moved_copy(&Kitti, &bytes, &Rigid::identity(), &mut copy).unwrap();
         assert_eq!(copy, bytes, "intensity and NaN stay");
         for length in (1..32).filter(|n| n % 16 != 0) {
-            let message = Kitti.read(&bytes[..length]).unwrap_err().to_string();
+            let message = points_of(&Kitti, &bytes[..length]).unwrap_err().to_string();
             assert!(message.contains("records of 16 bytes"), "{message}");
         }
-        assert!(Kitti.read(&[0; 20]).unwrap_err().to_string().contains("nuScenes"));
+        assert!(points_of(&Kitti, &[0; 20]).unwrap_err().to_string().contains("nuScenes"));
     }
 
     #[test]

@@ -17,6 +17,7 @@ use crate::{PointCloud, Rigid};
 
 mod arrays;
 mod atomic;
+mod contents;
 #[cfg(feature = "e57")]
 mod e57;
 mod error;
@@ -24,11 +25,13 @@ mod file;
 mod kitti;
 #[cfg(feature = "las")]
 mod las;
+mod memory;
 mod npy;
 mod npz;
 mod npz_writer;
 mod obj;
 pub mod off;
+mod options;
 mod pcd;
 mod ply;
 mod scalar;
@@ -39,10 +42,12 @@ mod text;
 
 pub use arrays::{ArrayError, NpzArrays, read_npy, read_npz};
 pub use atomic::{place_of, remove_left_overs, write_atomically};
+pub use contents::{Attribute, AttributeValues, Contents, Note, ScanEntry};
 pub use error::{FormatError, IoError};
 pub use file::{CloudFile, Kept, format_names};
 pub use npy::Array;
 pub use npz_writer::NpzWriter;
+pub use options::{ColumnName, OptionError, PointColumns, PointLayout, ReadOptions};
 pub use text::parse_point;
 
 /// A file format for clouds.
@@ -57,11 +62,35 @@ pub trait CloudFormat: Sync {
     /// [`FORMATS`].
     fn recognises(&self, bytes: &[u8]) -> bool;
 
-    /// The points in the bytes of a file, in the order of the file; shape `[n, 3]`, any numbers.
+    /// What the bytes of a file hold. Without [`ReadOptions::scan`] the points of all its scans, in one frame.
     ///
     /// # Errors
-    /// [`FormatError`] where the bytes are not of this format, or end too early.
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError>;
+    /// [`FormatError`] where the bytes are not of this format, end too early, can be read in several ways of which
+    /// `options` name none, or take more memory than they allow.
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError>;
+
+    /// Whether a file may hold several scans. The formats for which it may obey [`ReadOptions::scan`].
+    fn holds_scans(&self) -> bool {
+        false
+    }
+
+    /// The scans of a file, in its order; one where the format knows no more.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    fn scans(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<ScanEntry>, FormatError> {
+        let points = self.read(bytes, options)?.points.len() as u64;
+        Ok(vec![ScanEntry { name: String::new(), points, pose: None }])
+    }
+
+    /// What the points of [`read`](Self::read) have besides their place, in the order of the file.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        let _ = (bytes, options);
+        Ok(Vec::new())
+    }
 
     /// Writes the points, without loss.
     ///
@@ -70,11 +99,18 @@ pub trait CloudFormat: Sync {
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> std::io::Result<()>;
 
     /// Writes the file in `bytes` anew with its points moved by `motion` and its normals turned,
-    /// and all else as it is. Points with NaN or infinite coordinates stay where they are.
+    /// and all else as it is; `options` say which numbers are the points, as for [`read`](Self::read). Points with NaN
+    /// or infinite coordinates stay where they are.
     ///
     /// # Errors
     /// Those of `out`; inside them a [`FormatError`], of `bytes` or as for [`write`](Self::write).
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> std::io::Result<()>;
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> std::io::Result<()>;
 }
 
 /// All formats, the one that recognises almost anything last.
@@ -151,5 +187,7 @@ pub fn is_cloud_file(path: &Path) -> bool {
     file::format_of(path).is_ok()
 }
 
+#[cfg(test)]
+mod testing;
 #[cfg(test)]
 mod tests;

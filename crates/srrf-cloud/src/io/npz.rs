@@ -7,7 +7,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 use super::npy::{Npy, cloud_bytes};
-use super::{CloudFormat, FormatError};
+use super::{CloudFormat, Contents, FormatError, ReadOptions};
 use crate::Rigid;
 
 /// Names of the array that is the cloud, the first of them that is there.
@@ -35,10 +35,10 @@ impl CloudFormat for Npz {
         bytes.starts_with(b"PK\x03\x04")
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
         let mut archive = open(bytes)?;
         let cloud = choose(&mut archive)?;
-        Npy.read(&unpack_at(&mut archive, cloud, bytes.len())?)
+        Npy.read(&unpack_at(&mut archive, cloud, bytes.len())?, options)
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
@@ -49,12 +49,18 @@ impl CloudFormat for Npz {
         out.write_all(archive.finish()?.get_ref())
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
         let mut archive = open(bytes)?;
         let cloud = choose(&mut archive)?;
         let array = unpack_at(&mut archive, cloud, bytes.len())?;
         let mut copy = Vec::new();
-        Npy.rewrite(&array, motion, &mut copy)?;
+        Npy.rewrite(&array, options, motion, &mut copy)?;
         let mut written = ZipWriter::new(Cursor::new(Vec::new()));
         for index in 0..archive.len() {
             let entry = archive.by_index_raw(index)?;
@@ -143,6 +149,7 @@ fn put(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::testing::{moved_copy, points_of};
 
     fn archive(arrays: &[(&str, &[[f64; 3]])], method: CompressionMethod) -> Vec<u8> {
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
@@ -161,13 +168,18 @@ mod tests {
     #[test]
     fn the_cloud_is_chosen_by_name_or_shape() {
         for method in [CompressionMethod::Stored, CompressionMethod::Deflated] {
-            assert_eq!(Npz.read(&archive(&[("other.npy", B), ("points.npy", A)], method)).unwrap(), A);
-            assert_eq!(Npz.read(&archive(&[("other.npy", B)], method)).unwrap(), B);
+            assert_eq!(points_of(&Npz, &archive(&[("other.npy", B), ("points.npy", A)], method)).unwrap(), A);
+            assert_eq!(points_of(&Npz, &archive(&[("other.npy", B)], method)).unwrap(), B);
         }
         let two = archive(&[("a.npy", A), ("b.npy", B)], CompressionMethod::Stored);
-        let error = Npz.read(&two).unwrap_err().to_string();
+        let error = points_of(&Npz, &two).unwrap_err().to_string();
         assert!(error.contains("[\"a\", \"b\"]") && error.contains("more than one"), "{error}");
-        assert!(Npz.read(&archive(&[], CompressionMethod::Stored)).unwrap_err().to_string().contains("none"));
+        assert!(
+            points_of(&Npz, &archive(&[], CompressionMethod::Stored))
+                .unwrap_err()
+                .to_string()
+                .contains("none")
+        );
     }
 
     #[test]
@@ -175,21 +187,21 @@ mod tests {
         let bytes = archive(&[("b.npy", B), ("points.npy", A)], CompressionMethod::Deflated);
         let motion = Rigid { translation: [1.0, 0.0, 0.0].into(), ..Rigid::identity() };
         let mut copy = Vec::new();
-        Npz.rewrite(&bytes, &motion, &mut copy).unwrap();
-        assert_eq!(Npz.read(&copy).unwrap(), [[1.1, 2.0, 3.0]]);
+        moved_copy(&Npz, &bytes, &motion, &mut copy).unwrap();
+        assert_eq!(points_of(&Npz, &copy).unwrap(), [[1.1, 2.0, 3.0]]);
         let mut read = open(&copy).unwrap();
         assert_eq!(read.len(), 3);
-        assert_eq!(Npy.read(&unpack_at(&mut read, 0, copy.len()).unwrap()).unwrap(), B);
+        assert_eq!(points_of(&Npy, &unpack_at(&mut read, 0, copy.len()).unwrap()).unwrap(), B);
     }
 
     #[test]
     fn bombs_and_damage() {
         let bomb = archive(&[("points.npy", &vec![[0.0; 3]; 300_000])], CompressionMethod::Deflated);
         assert!(bomb.len() < 20_000);
-        assert!(Npz.read(&bomb).unwrap_err().to_string().contains("200 times"));
+        assert!(points_of(&Npz, &bomb).unwrap_err().to_string().contains("200 times"));
         let good = archive(&[("points.npy", B)], CompressionMethod::Deflated);
         for length in 0..good.len() {
-            assert!(Npz.read(&good[..length]).is_err(), "{length}");
+            assert!(points_of(&Npz, &good[..length]).is_err(), "{length}");
         }
     }
 }

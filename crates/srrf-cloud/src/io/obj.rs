@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::scan::{ByteLines, Line, Splice, moved, number, quote, turned, write_rows};
-use super::{CloudFormat, FormatError};
+use super::{CloudFormat, Contents, FormatError, Note, ReadOptions};
 use crate::Rigid;
 
 /// The words with which lines of an OBJ file begin.
@@ -64,59 +64,91 @@ impl CloudFormat for Obj {
 
     fn recognises(&self, bytes: &[u8]) -> bool {
         let first =
-            ByteLines::new(bytes).find_map(|line| line.words().next().filter(|(_, word)| word[0] != b'#'));
+            statements(bytes).find_map(|line| words(&line).next().filter(|(_, word)| word[0] != b'#'));
         first.is_some_and(|(_, word)| WORDS.iter().any(|known| known.as_bytes() == word))
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
-        let mut points = Vec::new();
-        let mut last_face: Option<(usize, u64)> = None;
-        for line in ByteLines::new(bytes) {
-            let mut words = line.words();
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
+        let mut points: Vec<[f64; 3]> = Vec::new();
+        let mut faces: Vec<[u32; 3]> = Vec::new();
+        let mut largest: Option<(usize, u64)> = None;
+        let mut unknown: Option<(Line, usize)> = None;
+        for line in statements(bytes) {
+            let mut words = words(&line);
             let Some((_, word)) = words.next() else { continue };
+            let held = bytes.len();
             match word {
-                b"v" => points.push(triple(&line)?.1),
-                b"f" => {
-                    // Corners are `vertex/texture/normal`; negative ones count from the last vertex.
-                    for (_, corner) in words.take_while(|(_, word)| *word != b"\\") {
-                        let index = corner.split(|&b| b == b'/').next().unwrap_or_default();
-                        let index = std::str::from_utf8(index).ok().and_then(|i| i.parse::<i64>().ok());
-                        let index = index.filter(|&index| index != 0 && index >= -(points.len() as i64));
+                b"v" => {
+                    options.grow("the points", held + size_of_val(&faces[..]), &mut points)?;
+                    points.push(triple(&line)?.1);
+                }
+                b"f" | b"fo" => {
+                    let (mut first, mut before) = (0, 0);
+                    for (place, (_, corner)) in words.enumerate() {
+                        let index = vertex(corner, points.len());
                         let index =
                             index.ok_or_else(|| line.error(format!("{} is no corner", quote(corner))))?;
-                        let largest = last_face.map_or(0, |(_, index)| index);
-                        if index.unsigned_abs() > largest && index > 0 {
-                            last_face = Some((line.number, index.unsigned_abs()));
+                        if largest.is_none_or(|(_, largest)| index > largest) {
+                            largest = Some((line.number, index));
                         }
+                        let corner = u32::try_from(index - 1).unwrap_or(u32::MAX);
+                        match place {
+                            0 => first = corner,
+                            1 => {}
+                            _ => {
+                                options.grow("the faces", held + size_of_val(&points[..]), &mut faces)?;
+                                faces.push([first, before, corner]);
+                            }
+                        }
+                        before = corner;
                     }
                 }
                 _ if word[0] == b'#' || WORDS.iter().any(|known| known.as_bytes() == word) => {}
-                // The rest of a line that was broken with a backslash.
-                _ if line.start >= 2 && bytes[..line.start].trim_ascii_end().ends_with(b"\\") => {}
-                _ => return Err(line.error(format!("{} begins no line of an OBJ file", quote(word)))),
+                _ if word[0].is_ascii_alphabetic() => {
+                    unknown = Some(unknown.map_or((line, 1), |(first, count)| (first, count + 1)));
+                }
+                _ => return Err(begins_nothing(&line, word)),
             }
         }
-        match last_face {
-            Some((line, index)) if index > points.len() as u64 => Err(FormatError::line(
-                line,
-                format!(
-                    "a face names vertex {index}, but there are {}; is the file cut short?",
-                    points.len()
-                ),
-            )),
-            _ => Ok(points),
+        if let Some((line, index)) = largest.filter(|(_, index)| *index > points.len() as u64) {
+            let problem = format!(
+                "a face names vertex {index}, but there are {}; is the file cut short?",
+                points.len()
+            );
+            return Err(FormatError::line(line, problem));
         }
+        let mut notes = Vec::new();
+        if let Some((line, count)) = unknown {
+            let word = words(&line).next().map_or(&b""[..], |(_, word)| word);
+            if points.is_empty() {
+                return Err(begins_nothing(&line, word));
+            }
+            let what = format!(
+                "{count} line{} that OBJ does not know, the first is line {}: {}",
+                if count == 1 { "" } else { "s" },
+                line.number,
+                quote(word)
+            );
+            notes.push(Note::Ignored { what });
+        }
+        Ok(Contents { points, faces, notes, ..Contents::default() })
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
         write_rows(points, "v ", out)
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-        self.read(bytes)?;
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
+        self.read(bytes, options)?;
         let mut splice = Splice::new(bytes, out);
-        for line in ByteLines::new(bytes) {
-            let turn = match line.words().next() {
+        for line in statements(bytes) {
+            let turn = match words(&line).next() {
                 Some((_, b"v")) => moved,
                 Some((_, b"vn")) => turned,
                 _ => continue,
@@ -129,9 +161,47 @@ impl CloudFormat for Obj {
     }
 }
 
+fn begins_nothing(line: &Line, word: &[u8]) -> FormatError {
+    line.error(format!("{} begins no line of an OBJ file", quote(word)))
+}
+
+/// The lines, each with those that a backslash at its end joins to it, without a byte order mark.
+fn statements(bytes: &[u8]) -> impl Iterator<Item = Line<'_>> {
+    let mut lines = ByteLines::new(bytes);
+    std::iter::from_fn(move || {
+        let mut line = lines.next()?;
+        if line.start == 0 && line.text.starts_with("\u{feff}".as_bytes()) {
+            line = Line { start: 3, text: &line.text[3..], ..line };
+        }
+        while line.text.trim_ascii_end().ends_with(b"\\") {
+            let Some(more) = lines.next() else { break };
+            line.text = &bytes[line.start..more.start + more.text.len()];
+        }
+        Some(line)
+    })
+}
+
+/// The words of a statement with their offsets in the file.
+fn words<'a>(line: &Line<'a>) -> impl Iterator<Item = (usize, &'a [u8])> + use<'a> {
+    let bare = |(at, word): (usize, &'a [u8])| (at, word.strip_suffix(b"\\").unwrap_or(word));
+    line.words().map(bare).filter(|(_, word)| !word.is_empty())
+}
+
+/// The number, from 1, of the vertex of a corner `vertex/texture/normal`; negative ones count back from the last of
+/// the `known` vertices.
+fn vertex(corner: &[u8], known: usize) -> Option<u64> {
+    let index = corner.split(|&b| b == b'/').next().unwrap_or_default();
+    let index: i64 = std::str::from_utf8(index).ok()?.parse().ok()?;
+    match index {
+        1.. => Some(index as u64),
+        _ if index < 0 => (known as u64 + 1).checked_sub(index.unsigned_abs()).filter(|&index| index > 0),
+        _ => None,
+    }
+}
+
 /// The three numbers behind the first word of a line.
 fn triple(line: &Line) -> Result<([std::ops::Range<usize>; 3], [f64; 3]), FormatError> {
-    let mut words = line.words().skip(1);
+    let mut words = words(line).skip(1);
     let (mut places, mut point) = ([0..0, 0..0, 0..0], [0.0; 3]);
     for axis in 0..3 {
         let (at, word) =
@@ -145,26 +215,30 @@ fn triple(line: &Line) -> Result<([std::ops::Range<usize>; 3], [f64; 3]), Format
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::testing::{moved_copy, points_of};
 
     const TEXT: &str = "# a\r\nmtllib a.mtl\r\nv 1 2.0 3 0.5 0.5 0.5\nvn 0 0 1\nv  -1 0 1e2\nv 0 0 0\n\
                         f 1//1 2//1 \\\n3//1\nf -1 -2 -3\n";
 
     #[test]
     fn vertices_are_points() {
-        assert_eq!(Obj.read(TEXT.as_bytes()).unwrap(), [[1.0, 2.0, 3.0], [-1.0, 0.0, 100.0], [0.0; 3]]);
+        assert_eq!(
+            points_of(&Obj, TEXT.as_bytes()).unwrap(),
+            [[1.0, 2.0, 3.0], [-1.0, 0.0, 100.0], [0.0; 3]]
+        );
         let motion = Rigid {
             rotation: nalgebra::Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0),
             ..Rigid::identity()
         };
         let mut copy = Vec::new();
-        Obj.rewrite(TEXT.as_bytes(), &motion, &mut copy).unwrap();
+        moved_copy(&Obj, TEXT.as_bytes(), &motion, &mut copy).unwrap();
         let expected = TEXT.replace("v 1 2.0 3", "v 1 -3 2").replace("vn 0 0 1", "vn 0 -1 0");
         assert_eq!(String::from_utf8(copy).unwrap(), expected.replace("-1 0 1e2", "-1 -100 0"));
     }
 
     #[test]
     fn damage_is_found() {
-        let error = |text: &str| Obj.read(text.as_bytes()).unwrap_err().to_string();
+        let error = |text: &str| points_of(&Obj, text.as_bytes()).unwrap_err().to_string();
         assert!(error("v 1 2\n").contains("line 1: 2 numbers"));
         assert!(error("v 1,5 2 3\n").contains("write decimals with a point"));
         assert!(error("v 1 2 3\nf 1 2 3\n").contains("line 2: a face names vertex 3"));

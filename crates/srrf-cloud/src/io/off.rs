@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::ops::Range;
 
 use super::scan::{ByteLines, Line, Splice, moved, number, turned, words, write_rows};
-use super::{CloudFormat, FormatError};
+use super::{CloudFormat, Contents, FormatError, ReadOptions};
 use crate::Rigid;
 
 /// A mesh: vertices `[n, 3]`, and triangles as indices of vertices.
@@ -13,7 +13,7 @@ pub struct OffMesh {
     /// Shape `[n, 3]`.
     pub vertices: Vec<[f64; 3]>,
     /// Three numbers of vertices each.
-    pub triangles: Vec<[usize; 3]>,
+    pub triangles: Vec<[u32; 3]>,
 }
 
 /// Text OFF files; the vertices are the points. A moved copy keeps faces and colours as they are;
@@ -34,8 +34,9 @@ impl CloudFormat for Off {
         line.is_some_and(|text| magic(text).is_some())
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
-        Ok(parse_mesh(bytes)?.vertices)
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
+        let OffMesh { vertices, triangles } = parse(bytes, options)?;
+        Ok(Contents { points: vertices, faces: triangles, ..Contents::default() })
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
@@ -43,8 +44,14 @@ impl CloudFormat for Off {
         write_rows(points, "", out)
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-        parse_mesh(bytes)?;
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
+        parse(bytes, options)?;
         let mut lines = significant(bytes);
         let header = OffHeader::parse(&mut lines)?;
         let mut splice = Splice::new(bytes, out);
@@ -130,11 +137,17 @@ fn triple(line: &Line, skip: usize) -> Result<([Range<usize>; 3], [f64; 3]), For
 
 /// Reads a text OFF file. Polygons become fans of triangles; colours and normals are passed over.
 pub fn parse_mesh(bytes: &[u8]) -> Result<OffMesh, FormatError> {
+    parse(bytes, &ReadOptions::default())
+}
+
+fn parse(bytes: &[u8], options: &ReadOptions) -> Result<OffMesh, FormatError> {
     let mut lines = significant(bytes);
     let OffHeader { vertices, faces, .. } = OffHeader::parse(&mut lines)?;
     // The counts are not trusted with memory: a line takes 6 bytes or more.
     let mut mesh = OffMesh::default();
-    mesh.vertices.reserve(vertices.min(bytes.len() / 6));
+    let most = vertices.min(bytes.len() / 6);
+    options.check_points(bytes.len(), most)?;
+    mesh.vertices.reserve(most);
     for line in lines.by_ref().take(vertices) {
         mesh.vertices.push(triple(&line, 0)?.1);
     }
@@ -144,21 +157,12 @@ pub fn parse_mesh(bytes: &[u8]) -> Result<OffMesh, FormatError> {
     }
     let mut found = 0;
     for line in lines.by_ref().take(faces) {
-        let index = |(_, word)| std::str::from_utf8(word).ok().and_then(|word| word.parse::<usize>().ok());
-        let mut fields = line.words().map(index);
-        let Some(Some(count)) = fields.next() else {
-            return Err(line.error("the number of corners of a face is expected"));
-        };
-        let corners: Vec<usize> = fields.take(count).map_while(|field| field).collect();
-        if corners.len() < count {
-            return Err(line.error("the face has fewer corners than it says"));
-        }
-        if corners.iter().any(|&corner| corner >= vertices) {
-            return Err(line.error("the face names a vertex that does not exist"));
-        }
-        for pair in corners.windows(2).skip(1) {
-            mesh.triangles.push([corners[0], pair[0], pair[1]]);
-        }
+        let held = bytes.len() + size_of_val(&mesh.vertices[..]);
+        fan(&line, vertices, |triangle| {
+            options.grow("the faces", held, &mut mesh.triangles)?;
+            mesh.triangles.push(triangle);
+            Ok(())
+        })?;
         found += 1;
     }
     if found < faces {
@@ -173,9 +177,39 @@ pub fn parse_mesh(bytes: &[u8]) -> Result<OffMesh, FormatError> {
     }
 }
 
+/// The triangles of a face.
+fn fan(
+    line: &Line,
+    vertices: usize,
+    mut each: impl FnMut([u32; 3]) -> Result<(), FormatError>,
+) -> Result<(), FormatError> {
+    let index = |(_, word)| std::str::from_utf8(word).ok().and_then(|word| word.parse::<u32>().ok());
+    let mut fields = line.words().map(index);
+    let Some(Some(count)) = fields.next() else {
+        return Err(line.error("the number of corners of a face is expected"));
+    };
+    let (mut first, mut before) = (0, 0);
+    for place in 0..count {
+        let Some(Some(corner)) = fields.next() else {
+            return Err(line.error("the face has fewer corners than it says"));
+        };
+        if corner as usize >= vertices {
+            return Err(line.error("the face names a vertex that does not exist"));
+        }
+        match place {
+            0 => first = corner,
+            1 => {}
+            _ => each([first, before, corner])?,
+        }
+        before = corner;
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::testing::moved_copy;
 
     const BODY: &str = "0 0 0\n1 0 0 255 0 0\n1 1 0\n0 1 0.5\n\n4 0 1 2 3\n3 0 2 3 0.5 0.5 0.5\n";
 
@@ -207,7 +241,7 @@ mod tests {
         let motion = Rigid { translation: [1.0, 0.0, -2.0].into(), ..Rigid::identity() };
         let text = "# a\r\n NOFF # b\r2 1 0\n  0 0.50 0 1 0 0 255 # c\n\n1 1 1 0 0 1 9\n2 0 1 0.1\n";
         let mut copy = Vec::new();
-        Off.rewrite(text.as_bytes(), &motion, &mut copy).unwrap();
+        moved_copy(&Off, text.as_bytes(), &motion, &mut copy).unwrap();
         let expected = text.replace("0 0.50 0 1", "1 0.50 -2 1").replace("1 1 1 0", "2 1 -1 0");
         assert_eq!(String::from_utf8(copy).unwrap(), expected);
     }

@@ -71,6 +71,11 @@ impl Scalar {
         }
     }
 
+    /// Whether single precision holds every number of this type.
+    pub fn is_single(self) -> bool {
+        matches!(self, Self::I8 | Self::U8 | Self::I16 | Self::U16 | Self::F32)
+    }
+
     /// Whether this type holds `value` without rounding.
     pub fn holds(self, value: f64) -> bool {
         let mut bytes = Vec::with_capacity(8);

@@ -1,12 +1,12 @@
 //! STL, triangles as text or binary.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::io::{self, Write};
 use std::ops::Range;
 
-use super::scan::{ByteLines, Line, Splice, moved, number, quote, turned};
+use super::scan::{ByteLines, Line, Splice, moved, number, quote, turned, words};
 use super::single::check_single;
-use super::{CloudFormat, FormatError};
+use super::{CloudFormat, Contents, FormatError, Note, ReadOptions};
 use crate::Rigid;
 
 /// Bytes before the triangles of a binary file, and of a triangle: a normal, three corners and two
@@ -35,26 +35,30 @@ impl CloudFormat for Stl {
             || is_text(bytes)
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
-        let (mut seen, mut points) = (HashSet::new(), Vec::new());
-        let mut add = |point: [f64; 3]| {
-            // 0 and -0 are the same place.
-            if seen.insert(point.map(|c| (c + 0.0).to_bits())) {
-                points.push(point);
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
+        let mut mesh =
+            Corners { seen: HashMap::new(), points: Vec::new(), triangle: Vec::new(), faces: Vec::new() };
+        let (binary, extra) = is_binary(bytes)?;
+        if binary {
+            let triangles = triangles(bytes);
+            // Each triangle has at most three points of its own, in a list and in a table.
+            let most = triangles.len().saturating_mul(3 * 72 + 12);
+            options.check_memory(&format!("{} triangles", triangles.len()), bytes.len(), most)?;
+            for record in triangles {
+                (1..4).for_each(|corner| mesh.add(vector(record, corner)));
             }
-        };
-        if is_binary(bytes)? {
-            let triangles = bytes[HEADER..].as_chunks::<RECORD>().0;
-            triangles.iter().for_each(|record| (1..4).for_each(|corner| add(vector(record, corner))));
         } else {
+            let held = bytes.len();
             text_rows(bytes, |_, _, kind, point| {
                 if kind == StlKind::Vertex {
-                    add(point);
+                    options.check_memory("the triangles", held, mesh.points.len().saturating_mul(3 * 72))?;
+                    mesh.add(point);
                 }
                 Ok::<_, FormatError>(())
             })?;
         }
-        Ok(points)
+        let notes = if extra > 0 { vec![Note::ExtraBytes { bytes: extra }] } else { Vec::new() };
+        Ok(Contents { points: mesh.points, faces: mesh.faces, single: binary, notes, ..Contents::default() })
     }
 
     fn write(&self, _points: &[[f64; 3]], _out: &mut dyn Write) -> io::Result<()> {
@@ -62,16 +66,23 @@ impl CloudFormat for Stl {
         Err(FormatError::Unwritable(problem.into()).into())
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-        let moved_points: Vec<[f64; 3]> = self.read(bytes)?.into_iter().map(|p| moved(motion, p)).collect();
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
+        let moved_points: Vec<[f64; 3]> =
+            self.read(bytes, options)?.points.into_iter().map(|p| moved(motion, p)).collect();
         let mut splice = Splice::new(bytes, out);
         let change = |kind: StlKind| if kind == StlKind::Vertex { moved } else { turned };
-        if !is_binary(bytes)? {
+        if !is_binary(bytes)?.0 {
             text_rows(bytes, |_, places, kind, old| splice.numbers(places, old, change(kind)(motion, old)))?;
             return splice.finish();
         }
         check_single(&moved_points, "binary STL")?;
-        for (index, record) in bytes[HEADER..].as_chunks::<RECORD>().0.iter().enumerate() {
+        for (index, record) in triangles(bytes).iter().enumerate() {
             for part in 0..4 {
                 let old = vector(record, part);
                 let new = change(if part == 0 { StlKind::Normal } else { StlKind::Vertex })(motion, old);
@@ -97,30 +108,70 @@ fn whole_length(count: u32) -> Option<usize> {
 fn is_text(bytes: &[u8]) -> bool {
     let begin = &bytes[..bytes.len().min(4096)];
     let has = |word: &[u8]| begin.windows(word.len()).any(|window| window.eq_ignore_ascii_case(word));
-    begin.trim_ascii_start().starts_with(b"solid")
-        && (has(b"facet") || has(b"endsolid"))
-        && !begin.contains(&0)
+    begins_solid(begin) && (has(b"facet") || has(b"endsolid")) && !begin.contains(&0)
 }
 
-/// Whether the file is binary, and as long as it says. Binary files may begin with `solid` too.
-fn is_binary(bytes: &[u8]) -> Result<bool, FormatError> {
+/// Whether the first word is `solid`, in letters of any size.
+fn begins_solid(bytes: &[u8]) -> bool {
+    let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
+    words(&bytes[..bytes.len().min(200)]).next().is_some_and(|(_, word)| word.eq_ignore_ascii_case(b"solid"))
+}
+
+/// Whether the file is binary, and how many bytes it has beyond those it announces. Binary files may begin with
+/// `solid` too.
+fn is_binary(bytes: &[u8]) -> Result<(bool, usize), FormatError> {
     let count = announced(bytes);
     if count.is_some_and(|count| whole_length(count) == Some(bytes.len())) {
-        return Ok(true);
+        return Ok((true, 0));
     }
     if is_text(bytes) {
-        return Ok(false);
+        return Ok((false, 0));
     }
+    let extra = count.filter(|&count| count > 0).and_then(whole_length).and_then(|n| bytes.get(n..));
     match count {
+        Some(_) if extra.is_some_and(|rest| rest.len() < RECORD || rest.iter().all(|&b| b == 0)) => {
+            Ok((true, extra.map_or(0, <[u8]>::len)))
+        }
+        _ if begins_solid(bytes) => {
+            Err(FormatError::truncated("a text that ends with `endsolid`", format!("{} bytes", bytes.len())))
+        }
         Some(count) => {
             let found = (bytes.len() - HEADER) as f64 / RECORD as f64;
             Err(FormatError::truncated(format!("a binary STL of {count} triangles"), format!("{found}")))
         }
-        None if bytes.trim_ascii_start().starts_with(b"solid") => {
-            Err(FormatError::truncated("a text that ends with `endsolid`", format!("{} bytes", bytes.len())))
-        }
         None => {
             Err(FormatError::Content("neither text STL (`solid`) nor 84 bytes of a binary header".into()))
+        }
+    }
+}
+
+/// The triangles of a binary file.
+fn triangles(bytes: &[u8]) -> &[[u8; RECORD]] {
+    let rows = bytes.get(HEADER..).unwrap_or_default().as_chunks::<RECORD>().0;
+    let count = announced(bytes).map_or(0, |count| usize::try_from(count).unwrap_or(usize::MAX));
+    &rows[..rows.len().min(count)]
+}
+
+/// Corners of triangles, each only once.
+struct Corners {
+    seen: HashMap<[u64; 3], u32>,
+    points: Vec<[f64; 3]>,
+    triangle: Vec<u32>,
+    faces: Vec<[u32; 3]>,
+}
+
+impl Corners {
+    fn add(&mut self, point: [f64; 3]) {
+        // 0 and -0 are the same place.
+        let next = self.points.len() as u32;
+        let place = *self.seen.entry(point.map(|c| (c + 0.0).to_bits())).or_insert(next);
+        if place == next {
+            self.points.push(point);
+        }
+        self.triangle.push(place);
+        if let [a, b, c] = self.triangle[..] {
+            self.faces.push([a, b, c]);
+            self.triangle.clear();
         }
     }
 }
@@ -147,6 +198,7 @@ fn text_rows<E: From<FormatError>>(
     for line in ByteLines::new(bytes) {
         let mut words = line.words();
         let Some((_, word)) = words.next() else { continue };
+        let word = word.strip_prefix("\u{feff}".as_bytes()).unwrap_or(word);
         let kind = match word.to_ascii_lowercase().as_slice() {
             b"solid" | b"outer" => {
                 open = true;
@@ -191,6 +243,7 @@ fn text_rows<E: From<FormatError>>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::testing::{moved_copy, points_of};
 
     const TEXT: &str = "solid a b\r\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1.50 0 0\n   \
                         vertex 0 1 0\n  endloop\n endfacet\n facet normal 0 0 1\n  outer loop\n   vertex 1.5 0 0\n   \
@@ -213,8 +266,8 @@ mod tests {
 
     #[test]
     fn corners_appear_once() {
-        assert_eq!(Stl.read(TEXT.as_bytes()).unwrap(), POINTS);
-        assert_eq!(Stl.read(&binary()).unwrap(), POINTS);
+        assert_eq!(points_of(&Stl, TEXT.as_bytes()).unwrap(), POINTS);
+        assert_eq!(points_of(&Stl, &binary()).unwrap(), POINTS);
         assert!(Stl.recognises(TEXT.as_bytes()) && Stl.recognises(&binary()) && !Stl.recognises(b"solid"));
     }
 
@@ -226,14 +279,14 @@ mod tests {
         };
         let copy = |bytes: &[u8]| {
             let mut out = Vec::new();
-            Stl.rewrite(bytes, &motion, &mut out).unwrap();
+            moved_copy(&Stl, bytes, &motion, &mut out).unwrap();
             out
         };
         let moved = [[0.5, 0.0, 0.0], [2.0, 0.0, 0.0], [0.5, 0.0, 1.0], [1.5, 0.0, 1.0]];
-        assert_eq!(Stl.read(&copy(TEXT.as_bytes())).unwrap(), moved);
+        assert_eq!(points_of(&Stl, &copy(TEXT.as_bytes())).unwrap(), moved);
         assert!(String::from_utf8(copy(TEXT.as_bytes())).unwrap().contains("facet normal 0 -1 0\n"));
         let bytes = copy(&binary());
-        assert_eq!(Stl.read(&bytes).unwrap(), moved);
+        assert_eq!(points_of(&Stl, &bytes).unwrap(), moved);
         assert_eq!((&bytes[..84], &bytes[132..134]), (&binary()[..84], &[7u8, 9][..]));
         assert_eq!(vector(bytes[84..].first_chunk().unwrap(), 0), [0.0, -1.0, 0.0]);
     }
@@ -242,10 +295,10 @@ mod tests {
     fn damage_is_found() {
         for bytes in [binary(), TEXT.as_bytes().to_vec()] {
             for length in 0..bytes.len() - 12 {
-                assert!(Stl.read(&bytes[..length]).is_err(), "{length}");
+                assert!(points_of(&Stl, &bytes[..length]).is_err(), "{length}");
             }
         }
-        let error = |text: &str| Stl.read(text.as_bytes()).unwrap_err().to_string();
+        let error = |text: &str| points_of(&Stl, text.as_bytes()).unwrap_err().to_string();
         assert!(error("solid\nfacet normal 0 0 1\nvertex 0 0\n").contains("line 3: 2 numbers"));
         assert!(error("solid\nfacet normal 0 0 1\nvertex 0 0 0\nendfacet").contains("facet of 1 corners"));
         assert!(Stl.write(&POINTS, &mut Vec::new()).unwrap_err().to_string().contains("write .ply"));

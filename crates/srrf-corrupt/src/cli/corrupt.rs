@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use srrf_args::flags::{Quiet, Seed, value};
+use srrf_args::reading::ReadFlags;
 use srrf_args::words::{count, points};
 use srrf_args::{Failure, Output, Places, ProgressArgs, files};
 use srrf_cloud::PointCloud;
@@ -64,6 +65,9 @@ pub struct CorruptArgs {
     drop_nan: bool,
 
     #[command(flatten)]
+    read: ReadFlags,
+
+    #[command(flatten)]
     quiet: Quiet,
 
     #[command(flatten)]
@@ -83,7 +87,7 @@ pub fn corrupt(args: &CorruptArgs) -> Result<ExitCode, Failure> {
     Places::new().reads("the cloud", &**input).writes_cloud("--output", &**output)?.check()?;
     let progress = args.progress.start(args.quiet.quiet);
     progress.step(format!("reading {input:?}"));
-    let input = files::read(input, None)?;
+    let input = files::read(input, None, args.read.options())?;
     progress.step(format!("corrupting {:?}", input.name));
     let (unit, frame) = input.cloud.to_unit_sphere();
     let corruption = corruption(kind, &args.reading.variants());
@@ -104,7 +108,8 @@ pub fn corrupt(args: &CorruptArgs) -> Result<ExitCode, Failure> {
         0 => String::new(),
         n => format!("; {} with NaN or infinity were left out before", count(n)),
     };
-    Output::new(args.quiet.quiet, files::is_stream(output)).say(&format!(
+    let out = Output::new(args.quiet.quiet, files::is_stream(output));
+    out.say(&format!(
         "wrote {}: {} {}, seed {seed}; {} became {}, {} of them new{dropped}",
         output.display(),
         corruption.name(),
@@ -113,5 +118,6 @@ pub fn corrupt(args: &CorruptArgs) -> Result<ExitCode, Failure> {
         count(corrupted.len()),
         count(added),
     ));
+    input.notes.iter().for_each(|note| out.say(&format!("warning: {}: {note}.", input.name)));
     Ok(ExitCode::SUCCESS)
 }

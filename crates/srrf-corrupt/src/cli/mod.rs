@@ -36,7 +36,7 @@ pub struct CorruptCli {
 /// What can be done besides corrupting a file.
 #[derive(Debug, Subcommand)]
 enum Verb {
-    Sheet(sheet::SheetArgs),
+    Sheet(Box<sheet::SheetArgs>),
     #[command(flatten)]
     Scripts(Scripts),
 }

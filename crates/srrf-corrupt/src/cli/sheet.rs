@@ -7,6 +7,7 @@ use clap::Args;
 use rand::{SeedableRng, rngs::ChaCha8Rng, seq::index};
 use srrf_args::flags::{Quiet, Seed, UpAxis, help, value};
 use srrf_args::numbers::{real, whole};
+use srrf_args::reading::ReadFlags;
 use srrf_args::{Failure, Output, OutputKind, Places, files};
 use srrf_cloud::PointCloud;
 
@@ -64,6 +65,9 @@ pub struct SheetArgs {
     drop_nan: bool,
 
     #[command(flatten)]
+    read: ReadFlags,
+
+    #[command(flatten)]
     quiet: Quiet,
 }
 
@@ -77,7 +81,7 @@ pub fn sheet(args: &SheetArgs) -> Result<ExitCode, Failure> {
     let mut rng = ChaCha8Rng::seed_from_u64(args.seed.seed);
     let (cloud, name) = match &args.input {
         Some(path) => {
-            let input = files::read(path, None)?;
+            let input = files::read(path, None, args.read.options())?;
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             (thinned(input.cloud, args.points, &mut rng)?.to_unit_sphere().0, name)
         }

@@ -101,7 +101,7 @@ impl MeshFile {
             off::parse_mesh(&bytes).map_err(|source| IoError::Format { path: self.path.clone(), source })?;
         let mut surface = Triangles::default();
         for corners in &parsed.triangles {
-            let [a, b, c] = corners.map(|corner| Vector3::from(parsed.vertices[corner]));
+            let [a, b, c] = corners.map(|corner| Vector3::from(parsed.vertices[corner as usize]));
             surface.push(a, b, c);
         }
         if surface.area() <= 0.0 {

@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 use srrf_align::{Map, MapEdge, PlacedScan};
 use srrf_args::Failure;
 use srrf_cloud::Rigid;
+use srrf_cloud::pose::PoseFile;
 
 use super::align_scans::ScanFiles;
-use super::transform;
 
 /// Name of the JSON.
 pub const SCHEMA: &str = "srrf-align";
@@ -29,7 +29,8 @@ pub fn matrix(pose: &Rigid) -> [[f64; 4]; 4] {
 pub fn rigid_of(rows: &[[f64; 4]; 4]) -> Result<Rigid, String> {
     let text: String =
         rows.iter().map(|row| row.iter().map(|v| format!("{v:e} ")).collect::<String>() + "\n").collect();
-    transform::parse(&text)
+    let read = PoseFile::parse(text.as_bytes(), None).map_err(|e| e.to_string())?;
+    Ok(read.target_from_source)
 }
 
 /// Everything that is known, as JSON.

@@ -9,7 +9,7 @@ use srrf_align::Scans;
 use srrf_args::Failure;
 use srrf_args::files::{self, Input};
 use srrf_cloud::PointCloud;
-use srrf_cloud::io::is_cloud_file;
+use srrf_cloud::io::{ReadOptions, is_cloud_file};
 
 /// Bytes of a point in memory.
 const POINT: f64 = 24.0;
@@ -146,7 +146,7 @@ impl Scans for ScanFiles {
 }
 
 fn read(path: &Path) -> Result<OneScan, Failure> {
-    let Input { cloud, dropped, .. } = files::read_solid(path, None)?;
+    let Input { cloud, dropped, .. } = files::read_solid(path, None, ReadOptions::default())?;
     let middle = cloud.middle();
     let size =
         cloud.points().iter().map(|p| (nalgebra::Vector3::from(*p) - middle).norm()).fold(0.0, f64::max);

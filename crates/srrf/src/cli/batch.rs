@@ -12,13 +12,14 @@ use rayon::ThreadPoolBuilder;
 use serde_json::{Value, json};
 use srrf::{Registrar, Request};
 
-use super::common::{failed, left_out, to_json, unusable};
+use super::common::{failed, to_json, unusable, warnings_of};
 use super::method::MethodArgs;
 use super::page::{self, PageArgs};
 use super::poses::{PoseReading, looks_inverted};
 use super::scale::{self, ScaleArgs};
 use srrf_args::files::Input;
 use srrf_args::flags::{Common, Quiet, value};
+use srrf_args::reading::{PairReadFlags, described as described_reading};
 use srrf_args::words::{count, counted};
 use srrf_args::{Failure, Output, OutputKind, OutputLock, Places, Progress};
 use srrf_args::{files, interrupt};
@@ -97,6 +98,9 @@ pub struct BatchArgs {
 
     #[command(flatten)]
     reading: PoseReading,
+
+    #[command(flatten)]
+    read: PairReadFlags,
 
     #[command(flatten)]
     common: Common,
@@ -257,14 +261,19 @@ impl BatchArgs {
     /// What the answers depend on besides the clouds.
     fn describe(&self) -> Value {
         let m = &self.method;
-        json!({
+        let mut described = json!({
             "method": m.method,
             "rotation": m.rotation,
             "refine": !m.no_refine,
             "weights": m.weights.weights,
             "seed": m.seed.seed,
             "scale": self.scale.describe(),
-        })
+        });
+        let reading = [described_reading(&self.read.source()), described_reading(&self.read.target())];
+        if let (Value::Object(map), true) = (&mut described, reading.iter().any(|set| !set.is_empty())) {
+            map.insert("reading".into(), json!(reading));
+        }
+        described
     }
 }
 
@@ -351,12 +360,12 @@ impl Batch<'_> {
     }
 
     fn read_target(&self, row: &ListedPair) -> Result<Input, Failure> {
-        files::read_solid(&self.pairs.path(&row.target), None)
+        files::read_solid(&self.pairs.path(&row.target), None, self.args.read.target())
     }
 
     fn register(&self, row: &ListedPair, ready: &ReadyTarget) -> Result<Value, Failure> {
         let ReadyTarget { input: target, target: prepared } = ready;
-        let mut source = files::read_solid(&self.pairs.path(&row.source), None)?;
+        let mut source = files::read_solid(&self.pairs.path(&row.source), None, self.args.read.source())?;
         self.args.scale.apply(&mut source)?;
         let read = |file: &String| self.args.reading.read(&self.pairs.path(file));
         let initial = row.initial.as_ref().map(read).transpose()?.map(|guess| guess.target_from_source);
@@ -364,7 +373,7 @@ impl Batch<'_> {
         let found = self.args.scale.register(self.registrar, &request);
         let mut outcome = found.map_err(|e| failed(e, &source.name, &target.name))?;
         let dropped = [source.dropped, target.dropped];
-        outcome.warnings.extend([&source, target].into_iter().filter_map(left_out));
+        outcome.warnings.extend([&source, target].into_iter().flat_map(warnings_of));
         outcome.warnings.extend(initial.and_then(|pose| looks_inverted(&pose, &source.cloud, &target.cloud)));
         if let Some(folder) = &self.args.html {
             scale::applied(&outcome, &mut source)?;

@@ -59,8 +59,10 @@ pub fn failed(error: srrf::Error, source: &str, target: &str) -> Failure {
     }
 }
 
-/// The warning about points of a file that were left out.
-pub fn left_out(input: &Input) -> Option<Warning> {
-    let Input { name, dropped, .. } = input;
-    (*dropped > 0).then(|| Warning::LeftOut { cloud: name.clone(), points: *dropped })
+/// The warnings about a file: points that were left out, and what is to be known of its reading.
+pub fn warnings_of(input: &Input) -> Vec<Warning> {
+    let cloud = || input.name.clone();
+    let left_out = (input.dropped > 0).then(|| Warning::LeftOut { cloud: cloud(), points: input.dropped });
+    let notes = input.notes.iter().map(|note| Warning::Reading { cloud: cloud(), note: note.clone() });
+    left_out.into_iter().chain(notes).collect()
 }

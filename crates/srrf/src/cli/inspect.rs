@@ -7,12 +7,14 @@ use std::process::ExitCode;
 use clap::Args;
 use serde_json::{Value, json};
 use srrf_cloud::Solid;
+use srrf_cloud::io::ReadOptions;
 
 use super::statistics::Statistics;
 use srrf_args::Failure;
 use srrf_args::Output;
 use srrf_args::files::{self, Input};
 use srrf_args::flags::Common;
+use srrf_args::reading::ReadFlags;
 use srrf_args::words::{count, length, points, vector};
 
 /// Say what is in clouds: sizes, bounds, spacing, points with NaN, and what looks corrupted.
@@ -25,6 +27,9 @@ pub struct InspectArgs {
     /// Print JSON: a list with an object for each file
     #[arg(long)]
     json: bool,
+
+    #[command(flatten)]
+    read: ReadFlags,
 
     #[command(flatten)]
     common: Common,
@@ -41,7 +46,7 @@ pub fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
     let progress = args.common.progress();
     for path in &args.files {
         progress.step(format!("reading {path:?}"));
-        let inspected = inspect(path);
+        let inspected = inspect(path, args.read.options());
         progress.clear();
         match inspected {
             Ok((input, statistics)) if args.json => values.push(to_json(&input, &statistics)),
@@ -63,8 +68,8 @@ pub fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
     if failures.is_empty() { Ok(ExitCode::SUCCESS) } else { Err(Failure::usage(failures.join("\nerror: "))) }
 }
 
-fn inspect(path: &Path) -> Result<(Input, Statistics), Failure> {
-    let input = files::read(path, None)?;
+fn inspect(path: &Path, options: ReadOptions) -> Result<(Input, Statistics), Failure> {
+    let input = files::read(path, None, options)?;
     let statistics = Statistics::new(&input.cloud).map_err(|e| Failure::cloud(&input.name, &e))?;
     Ok((input, statistics))
 }
@@ -75,6 +80,11 @@ fn to_json(input: &Input, statistics: &Statistics) -> Value {
         map.insert("file".into(), json!(input.name));
         map.insert("format".into(), json!(input.file.format()));
         map.insert("dropped_points".into(), json!(input.dropped));
+        map.insert("faces".into(), json!(input.faces.len()));
+        map.insert("single_precision".into(), json!(input.single));
+        map.insert("viewpoint".into(), json!(input.viewpoint));
+        map.insert("grid".into(), json!(input.grid));
+        map.insert("notes".into(), json!(input.notes.iter().map(ToString::to_string).collect::<Vec<_>>()));
         map.insert("suggestions".into(), json!(statistics.suggestions()));
         map.insert("determines_rotation".into(), json!(Solid::new(&input.cloud).is_ok()));
     }
@@ -92,6 +102,18 @@ fn to_text(input: &Input, s: &Statistics) -> String {
         n => format!(", and {} with NaN or infinity", count(n)),
     };
     line("points", format!("{}{dropped}", count(s.points)));
+    if !input.faces.is_empty() {
+        line("faces", format!("{} triangles", count(input.faces.len())));
+    }
+    if let Some([width, height]) = input.grid {
+        line("grid", format!("{width} x {height}"));
+    }
+    if let Some(viewpoint) = input.viewpoint {
+        line("viewpoint", vector(viewpoint, s.spacing.max(f64::MIN_POSITIVE), 3));
+    }
+    for note in &input.notes {
+        line("note", note.to_string());
+    }
     let sides: [f64; 3] = std::array::from_fn(|c| s.high[c] - s.low[c]);
     let scale = if s.spacing > 0.0 { s.spacing } else { s.radius };
     line("box", format!("{} to {}", vector(s.low, scale, 3), vector(s.high, scale, 3)));

@@ -50,7 +50,7 @@ enum Command {
     Batch(Box<batch::BatchArgs>),
     Summary(batch::SummaryArgs),
     Align(Box<align::AlignArgs>),
-    View(view::ViewArgs),
+    View(Box<view::ViewArgs>),
     Corrupt(CorruptArgs),
     Skeleton(skeleton::SkeletonArgs),
     Weights(weights::WeightsArgs),

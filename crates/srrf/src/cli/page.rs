@@ -7,7 +7,7 @@ use srrf::{Outcome, Warning};
 use srrf_cloud::{RIGHT_IN_WORDS, Rigid};
 use srrf_view::{Number, Page, Pair, Pose, Tone, Up};
 
-use super::common::left_out;
+use super::common::warnings_of;
 use srrf_args::Failure;
 use srrf_args::files::Input;
 use srrf_args::words::count;
@@ -39,7 +39,7 @@ impl PageArgs {
             pair = pair.up(up);
         }
         for input in [source, target] {
-            if let Some(warning) = left_out(input) {
+            for warning in warnings_of(input) {
                 pair = pair.warning(warning.to_string());
             }
         }
@@ -110,8 +110,9 @@ pub fn of_outcome<'a>(
         }
         pair = pair.matches(network.matches.iter().copied());
     }
-    // Those about points left out are there already.
-    for warning in outcome.warnings.iter().filter(|w| !matches!(w, Warning::LeftOut { .. })) {
+    // Those about the files are there already.
+    let of_file = |w: &&Warning| matches!(w, Warning::LeftOut { .. } | Warning::Reading { .. });
+    for warning in outcome.warnings.iter().filter(|w| !of_file(w)) {
         pair = pair.warning(warning.to_string());
     }
     pair

@@ -10,7 +10,7 @@ use srrf_cloud::Rigid;
 use srrf_cloud::io::Kept;
 use srrf_cloud::pose::PoseNote;
 
-use super::common::{EXIT_CODES, answer, failed, left_out, unusable};
+use super::common::{EXIT_CODES, answer, failed, unusable, warnings_of};
 use super::method::MethodArgs;
 use super::page::{self, PageArgs};
 use super::poses::{PoseReading, PoseWriting, described, looks_inverted};
@@ -19,6 +19,7 @@ use super::watch::Watch;
 use super::{rrd, summary};
 use srrf_args::files::{self, Input};
 use srrf_args::flags::Common;
+use srrf_args::reading::PairReadFlags;
 use srrf_args::{Failure, Output, OutputKind, Places, Progress};
 
 /// The exit code of an answer that is probably wrong.
@@ -82,12 +83,15 @@ pub struct RegisterArgs {
     scale: ScaleArgs,
 
     /// Format of the source where it is a stream [default: by its content]
-    #[arg(long, value_name = "NAME")]
-    format_source: Option<String>,
+    #[arg(long, alias = "format-source", value_name = "NAME")]
+    source_format: Option<String>,
 
     /// Format of the target where it is a stream [default: by its content]
-    #[arg(long, value_name = "NAME")]
-    format_target: Option<String>,
+    #[arg(long, alias = "format-target", value_name = "NAME")]
+    target_format: Option<String>,
+
+    #[command(flatten)]
+    read: PairReadFlags,
 
     #[command(flatten)]
     page: PageArgs,
@@ -122,7 +126,7 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
         args.scale.register(&registrar, &request).map_err(|e| failed(e, &source.name, &target.name))?;
     scale::applied(&outcome, &mut source)?;
     outcome.times.insert(0, StageTime { stage: Stage::Open, seconds: opened });
-    outcome.warnings.extend([&source, &target].into_iter().filter_map(left_out));
+    outcome.warnings.extend([&source, &target].into_iter().flat_map(warnings_of));
     outcome.warnings.extend(initial.and_then(|pose| looks_inverted(&pose, &source.cloud, &target.cloud)));
 
     let written = if outcome.abstain && args.require_answer {
@@ -163,8 +167,8 @@ impl RegisterArgs {
 
     fn read(&self) -> Result<(Input, Input), Failure> {
         Ok((
-            files::read_solid(&self.source, self.format_source.as_deref())?,
-            files::read_solid(&self.target, self.format_target.as_deref())?,
+            files::read_solid(&self.source, self.source_format.as_deref(), self.read.source())?,
+            files::read_solid(&self.target, self.target_format.as_deref(), self.read.target())?,
         ))
     }
 

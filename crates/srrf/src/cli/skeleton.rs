@@ -7,8 +7,9 @@ use std::process::ExitCode;
 use clap::Args;
 use srrf::FoundSkeleton;
 
-use super::common::{failed, left_out};
+use super::common::{failed, warnings_of};
 use srrf_args::flags::{Common, Device, Weights, value};
+use srrf_args::reading::ReadFlags;
 use srrf_args::words::count;
 use srrf_args::{Failure, Output, OutputKind, Places, files};
 
@@ -35,6 +36,9 @@ pub struct SkeletonArgs {
     device: Device,
 
     #[command(flatten)]
+    read: ReadFlags,
+
+    #[command(flatten)]
     common: Common,
 }
 
@@ -50,7 +54,7 @@ pub fn run(args: &SkeletonArgs) -> Result<ExitCode, Failure> {
     let places = Places::new().reads("the cloud", &*args.input).reads("--weights", weights);
     places.writes("--output", &**output, OutputKind::PLY)?.check()?;
     args.common.threads.start()?;
-    let input = files::read_solid(&args.input, None)?;
+    let input = files::read_solid(&args.input, None, args.read.options())?;
     let found = srrf::skeleton(&input.cloud, args.weights.weights.as_deref(), &args.device.device)
         .map_err(|e| failed(e, &input.name, &input.name))?;
     files::write(output, to_ply(&found).as_bytes())?;
@@ -62,7 +66,7 @@ pub fn run(args: &SkeletonArgs) -> Result<ExitCode, Failure> {
         input.name,
         found.weights
     ));
-    if let Some(warning) = left_out(&input) {
+    for warning in warnings_of(&input) {
         out.say(&format!("warning: {warning}"));
     }
     Ok(ExitCode::SUCCESS)

@@ -9,6 +9,7 @@ use srrf_view::Pose;
 use super::page::{self, PageArgs};
 use super::poses::{PoseReading, described, looks_inverted};
 use srrf_args::flags::Common;
+use srrf_args::reading::PairReadFlags;
 use srrf_args::{Failure, Output, OutputKind, Places, files};
 
 /// Write a page that shows two clouds, and a pose between them if one is given.
@@ -41,6 +42,9 @@ pub struct ViewArgs {
     page: PageArgs,
 
     #[command(flatten)]
+    read: PairReadFlags,
+
+    #[command(flatten)]
     common: Common,
 }
 
@@ -61,7 +65,8 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode, Failure> {
     let pose = args.transform.as_deref().map(|path| args.reading.read(path)).transpose()?;
     let progress = args.common.progress();
     progress.step(format!("reading {:?} and {:?}", args.source, args.target));
-    let (source, target) = (files::read(&args.source, None)?, files::read(&args.target, None)?);
+    let source = files::read(&args.source, None, args.read.source())?;
+    let target = files::read(&args.target, None, args.read.target())?;
     let mut pair = args.page.pair(&source, &target);
     if let Some(pose) = &pose {
         out.say(&described("--transform", pose));

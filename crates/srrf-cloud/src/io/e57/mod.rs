@@ -9,7 +9,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use e57::{E57Reader, E57Writer, Record, RecordDataType, RecordName, RecordValue};
 use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::{CloudFormat, FormatError};
+use super::{CloudFormat, Contents, FormatError, ReadOptions};
 use crate::Rigid;
 
 /// E57 files. The points of all scans are read, each scan moved by its pose into the coordinates of
@@ -31,18 +31,24 @@ impl CloudFormat for E57 {
         bytes.starts_with(b"ASTM-E57")
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
         pages::check(bytes)?;
-        guarded(|| read(bytes))
+        guarded(|| read(bytes, options))
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&guarded(|| file(points))?)
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
         // Read once, so that a damaged file is not copied.
-        self.read(bytes)?;
+        self.read(bytes, options)?;
         if *motion == Rigid::identity() {
             return out.write_all(bytes);
         }
@@ -75,7 +81,7 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, E57Problem>) -> Result<T, FormatE
     }
 }
 
-fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, E57Problem> {
+fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, E57Problem> {
     let mut reader = E57Reader::new(Cursor::new(bytes))?;
     let mut points = Vec::new();
     for scan in reader.pointclouds() {
@@ -87,6 +93,8 @@ fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, E57Problem> {
                 format!("{} bytes", bytes.len()),
             )));
         }
+        let more = usize::try_from(scan.records).unwrap_or(usize::MAX);
+        options.check_points(bytes.len(), points.len().saturating_add(more)).map_err(E57Problem::Format)?;
         let columns = XyzColumns::of(&scan.prototype).map_err(E57Problem::Format)?;
         let pose = scan.transform.as_ref().map(|pose| {
             let (q, t) = (&pose.rotation, &pose.translation);
@@ -101,7 +109,7 @@ fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, E57Problem> {
             points.push(pose.as_ref().map_or(point, |pose| pose.apply(&point)));
         }
     }
-    Ok(points)
+    Ok(Contents::of_points(points))
 }
 
 /// Bits of a number in the file.

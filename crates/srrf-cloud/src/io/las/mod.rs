@@ -11,7 +11,7 @@ use std::io::{self, Write};
 
 use self::header::{LasAxis, LasHeader};
 use super::scan::moved;
-use super::{CloudFormat, FormatError};
+use super::{CloudFormat, Contents, FormatError, ReadOptions};
 use crate::Rigid;
 
 /// LAS files, versions 1.0 to 1.4. Coordinates are 32-bit integers times a scale plus an offset;
@@ -38,16 +38,22 @@ impl CloudFormat for Las {
         bytes.starts_with(b"LASF") && bytes.get(104).is_none_or(|format| format & 0x80 == 0)
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
-        read(bytes)
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
+        read(bytes, options)
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&file(points, false)?)
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&rewritten(bytes, motion)?)
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
+        out.write_all(&rewritten(bytes, options, motion)?)
     }
 }
 
@@ -64,28 +70,41 @@ impl CloudFormat for Laz {
         bytes.starts_with(b"LASF")
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
-        read(bytes)
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
+        read(bytes, options)
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&file(points, true)?)
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&rewritten(bytes, motion)?)
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
+        out.write_all(&rewritten(bytes, options, motion)?)
     }
 }
 
-fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
     let header = LasHeader::parse(bytes)?;
-    Ok(points(&header, &records(&header, bytes)?))
+    let records = records(&header, bytes, options)?;
+    let held = bytes.len() + if matches!(records, Cow::Owned(_)) { records.len() } else { 0 };
+    options.check_points(held, records.len() / header.record_length)?;
+    Ok(Contents::of_points(points(&header, &records)))
 }
 
 /// The points of a file as records, uncompressed.
-fn records<'a>(header: &LasHeader, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>, FormatError> {
+fn records<'a>(
+    header: &LasHeader,
+    bytes: &'a [u8],
+    options: &ReadOptions,
+) -> Result<Cow<'a, [u8]>, FormatError> {
     if header.zipped {
-        return zipped::decompress(header, header.laz(bytes)?, bytes).map(Cow::Owned);
+        return zipped::decompress(header, header.laz(bytes)?, bytes, options).map(Cow::Owned);
     }
     let body = &bytes[header.points_at..];
     let length = usize::try_from(header.points).ok().and_then(|n| n.checked_mul(header.record_length));
@@ -161,9 +180,9 @@ fn put_points(points: &[[f64; 3]], axes: &[LasAxis; 3], length: usize, records: 
     }
 }
 
-fn rewritten(bytes: &[u8], motion: &Rigid) -> io::Result<Vec<u8>> {
+fn rewritten(bytes: &[u8], options: &ReadOptions, motion: &Rigid) -> io::Result<Vec<u8>> {
     let header = LasHeader::parse(bytes)?;
-    let mut records = records(&header, bytes)?.into_owned();
+    let mut records = records(&header, bytes, options)?.into_owned();
     let old = points(&header, &records);
     let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
     if old == new {

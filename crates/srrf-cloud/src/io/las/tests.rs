@@ -1,4 +1,5 @@
 use super::*;
+use crate::io::testing::points_of;
 
 const POINTS: [[f64; 3]; 4] = [
     [431_234.567, 4_812_345.678, 12.5],
@@ -72,14 +73,14 @@ fn written_clouds_keep_a_billionth_of_their_size() {
     for format in [&Las as &dyn CloudFormat, &Laz] {
         let bytes = written(format, &POINTS);
         assert!(format.recognises(&bytes));
-        assert!(distance(&format.read(&bytes).unwrap(), &POINTS) < 1e-7);
-        assert_eq!(format.read(&written(format, &[[1e6, -2.5, 0.0]])).unwrap(), [[1e6, -2.5, 0.0]]);
+        assert!(distance(&points_of(format, &bytes).unwrap(), &POINTS) < 1e-7);
+        assert_eq!(points_of(format, &written(format, &[[1e6, -2.5, 0.0]])).unwrap(), [[1e6, -2.5, 0.0]]);
         assert!(format.write(&[[1e300, 0.0, 0.0], [0.0; 3]], &mut Vec::new()).is_err());
     }
     assert!(!Las.recognises(&written(&Laz, &POINTS)));
     let many: Vec<[f64; 3]> = (0..60_001).map(|i| [f64::from(i) * 0.01, f64::from(i % 7), 1.0]).collect();
     let bytes = written(&Laz, &many);
-    assert!(bytes.len() < many.len() * 6 && distance(&Laz.read(&bytes).unwrap(), &many) < 1e-6);
+    assert!(bytes.len() < many.len() * 6 && distance(&points_of(&Laz, &bytes).unwrap(), &many) < 1e-6);
 }
 
 #[test]
@@ -89,14 +90,17 @@ fn a_moved_copy_keeps_the_rest() {
         translation: [1000.0, -2000.0, 5.0].into(),
     };
     for bytes in [version_1_4(), version_1_4_zipped(), written(&Las, &POINTS), written(&Laz, &POINTS)] {
-        let old = read(&bytes).unwrap();
+        let old = points_of(&Las, &bytes).unwrap();
         assert!(distance(&old, &POINTS) < 1e-3);
         let new: Vec<[f64; 3]> = old.iter().map(|p| motion.apply(p)).collect();
-        let copy = rewritten(&bytes, &motion).unwrap();
-        assert!(distance(&read(&copy).unwrap(), &new) <= 0.000_011);
-        assert_eq!(rewritten(&bytes, &Rigid::identity()).unwrap(), bytes);
+        let copy = rewritten(&bytes, &ReadOptions::default(), &motion).unwrap();
+        assert!(distance(&points_of(&Las, &copy).unwrap(), &new) <= 0.000_011);
+        assert_eq!(rewritten(&bytes, &ReadOptions::default(), &Rigid::identity()).unwrap(), bytes);
         let (before, after) = (LasHeader::parse(&bytes).unwrap(), LasHeader::parse(&copy).unwrap());
-        let (a, b) = (records(&before, &bytes).unwrap(), records(&after, &copy).unwrap());
+        let (a, b) = (
+            records(&before, &bytes, &ReadOptions::default()).unwrap(),
+            records(&after, &copy, &ReadOptions::default()).unwrap(),
+        );
         for (a, b) in a.chunks(before.record_length).zip(b.chunks(after.record_length)) {
             assert_eq!(a[12..], b[12..], "attributes");
         }
@@ -109,14 +113,14 @@ fn damage_is_found() {
     for bytes in [version_1_4(), version_1_4_zipped(), written(&Las, &POINTS), written(&Laz, &POINTS)] {
         let end = if bytes.ends_with(b"knows") { bytes.len() - 80 } else { bytes.len() - 40 };
         for length in 0..end.min(375) {
-            assert!(read(&bytes[..length]).is_err(), "{length}");
+            assert!(points_of(&Las, &bytes[..length]).is_err(), "{length}");
         }
         let mut many = bytes.clone();
         let count = if bytes[25] == 4 { 247 } else { 107 };
         many[count..count + 4].copy_from_slice(&u32::MAX.to_le_bytes());
-        assert!(read(&many).unwrap_err().to_string().contains("4294967295 points"));
+        assert!(points_of(&Las, &many).unwrap_err().to_string().contains("4294967295 points"));
         let mut scale = bytes;
         scale[131..139].copy_from_slice(&f64::NAN.to_le_bytes());
-        assert!(read(&scale).unwrap_err().to_string().contains("scales"));
+        assert!(points_of(&Las, &scale).unwrap_err().to_string().contains("scales"));
     }
 }

@@ -6,7 +6,7 @@ use std::io::{self, Cursor};
 use laz::laszip::LazItemType;
 use laz::{LasZipCompressor, LasZipDecompressor, LazVlr};
 
-use super::super::FormatError;
+use super::super::{FormatError, ReadOptions};
 use super::header::LasHeader;
 use super::laz_record::{damaged, guarded};
 
@@ -69,13 +69,20 @@ fn check_layers(bytes: &[u8], at: usize, length: usize, layers: usize) -> Result
 }
 
 /// The records of all points.
-pub(super) fn decompress(header: &LasHeader, vlr: LazVlr, bytes: &[u8]) -> Result<Vec<u8>, FormatError> {
+pub(super) fn decompress(
+    header: &LasHeader,
+    vlr: LazVlr,
+    bytes: &[u8],
+    options: &ReadOptions,
+) -> Result<Vec<u8>, FormatError> {
     let length = header.record_length;
     let size = usize::try_from(header.points).ok().and_then(|n| n.checked_mul(length));
     let most = bytes.len().saturating_mul(RATIO).saturating_add(SLACK);
     let size = size.filter(|&size| size <= most).ok_or_else(|| {
         damaged(format!("{} points of {length} bytes announced in {} bytes", header.points, bytes.len()))
     })?;
+    // The records, which grow as points come.
+    options.check_memory("the unpacked points", bytes.len(), size.saturating_mul(2))?;
     if size == 0 {
         return Ok(Vec::new());
     }

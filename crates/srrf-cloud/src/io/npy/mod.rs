@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use self::header::{Descr, NpyHeader, NpyKind};
 use super::scalar::Scalar;
 use super::scan::moved;
-use super::{CloudFormat, FormatError};
+use super::{CloudFormat, Contents, FormatError, ReadOptions};
 use crate::Rigid;
 
 const DOUBLE: NpyKind = NpyKind { scalar: Scalar::F64, big_endian: false };
@@ -35,8 +35,11 @@ impl CloudFormat for Npy {
         bytes.starts_with(b"\x93NUMPY")
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
-        Ok(NpyTable::parse(bytes)?.points())
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
+        let table = NpyTable::parse(bytes)?;
+        options.check_points(bytes.len(), table.rows)?;
+        let single = table.axes.iter().all(|&axis| table.kinds[axis].scalar.is_single());
+        Ok(Contents { points: table.points(), single, ..Contents::default() })
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
@@ -44,8 +47,15 @@ impl CloudFormat for Npy {
         points.iter().flatten().try_for_each(|c| out.write_all(&c.to_le_bytes()))
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
         let table = NpyTable::parse(bytes)?;
+        options.check_points(bytes.len(), 2 * table.rows)?;
         let old = table.points();
         let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
         let fits = |axis: usize| {

@@ -1,6 +1,7 @@
 use npyz::WriterBuilder;
 
 use super::*;
+use crate::io::testing::{moved_copy, points_of};
 
 /// Arrays written by an independent implementation.
 fn array<T: npyz::AutoSerialize + Copy>(shape: &[u64], order: npyz::Order, data: &[T]) -> Vec<u8> {
@@ -29,11 +30,11 @@ fn with_header(text: &str, body: &[u8]) -> Vec<u8> {
 fn orders_types_and_widths() {
     let expected = vec![[0.0, 1.0, 2.0], [4.0, 5.0, 6.0]];
     let c: Vec<f32> = (0..8).map(|v| v as f32).collect();
-    assert_eq!(Npy.read(&array(&[2, 4], npyz::Order::C, &c)).unwrap(), expected);
+    assert_eq!(points_of(&Npy, &array(&[2, 4], npyz::Order::C, &c)).unwrap(), expected);
     let f: Vec<i32> = vec![0, 4, 1, 5, 2, 6];
-    assert_eq!(Npy.read(&array(&[2, 3], npyz::Order::Fortran, &f)).unwrap(), expected);
+    assert_eq!(points_of(&Npy, &array(&[2, 3], npyz::Order::Fortran, &f)).unwrap(), expected);
     let i: Vec<i64> = vec![0, 1, 2, 4, 5, 6];
-    assert_eq!(Npy.read(&array(&[2, 3], npyz::Order::C, &i)).unwrap(), expected);
+    assert_eq!(points_of(&Npy, &array(&[2, 3], npyz::Order::C, &i)).unwrap(), expected);
 }
 
 #[test]
@@ -43,11 +44,11 @@ fn fields_and_big_endian_numbers() {
     body.extend(2.5f32.to_be_bytes());
     body.extend(0.1f64.to_le_bytes());
     body.extend((-3i16).to_be_bytes());
-    assert_eq!(Npy.read(&with_header(text, &body)).unwrap(), [[0.1, -3.0, 2.5]]);
+    assert_eq!(points_of(&Npy, &with_header(text, &body)).unwrap(), [[0.1, -3.0, 2.5]]);
     let motion = Rigid { translation: [0.0, 0.5, 0.0].into(), ..Rigid::identity() };
     let mut copy = Vec::new();
-    Npy.rewrite(&with_header(text, &body), &motion, &mut copy).unwrap();
-    assert_eq!(Npy.read(&copy).unwrap(), [[0.1, -2.5, 2.5]], "the integer became a double");
+    moved_copy(&Npy, &with_header(text, &body), &motion, &mut copy).unwrap();
+    assert_eq!(points_of(&Npy, &copy).unwrap(), [[0.1, -2.5, 2.5]], "the integer became a double");
     assert_eq!(copy[copy.len() - 25], 7, "and the other field is still there");
 }
 
@@ -64,11 +65,11 @@ fn a_header_like_that_of_numpy() {
 fn bad_arrays() {
     let good = array(&[2, 3], npyz::Order::C, &[0.0f64; 6]);
     for length in 0..good.len() {
-        assert!(Npy.read(&good[..length]).is_err(), "{length}");
+        assert!(points_of(&Npy, &good[..length]).is_err(), "{length}");
     }
-    assert!(Npy.read(&[&good[..], &[0]].concat()).is_err());
-    assert!(Npy.read(&array(&[6], npyz::Order::C, &[0.0f64; 6])).is_err());
-    let error = Npy.read(&array(&[3, 2], npyz::Order::C, &[0.0f64; 6])).unwrap_err().to_string();
+    assert!(points_of(&Npy, &[&good[..], &[0]].concat()).is_err());
+    assert!(points_of(&Npy, &array(&[6], npyz::Order::C, &[0.0f64; 6])).is_err());
+    let error = points_of(&Npy, &array(&[3, 2], npyz::Order::C, &[0.0f64; 6])).unwrap_err().to_string();
     assert!(error.contains("[3, 2]") && error.contains("transpose"), "{error}");
     for (text, fact) in [
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904, 3), }", "no memory"),
@@ -79,7 +80,7 @@ fn bad_arrays() {
         ("{'shape': (1, 3)}", "lacks"),
         ("{'descr': '<f8", "end of a string"),
     ] {
-        let read = Npy.read(&with_header(text, &[]));
+        let read = points_of(&Npy, &with_header(text, &[]));
         if fact.is_empty() {
             assert_eq!(read, Ok(vec![]));
         } else {
@@ -88,5 +89,5 @@ fn bad_arrays() {
         }
     }
     let deep = "(".repeat(60_000);
-    assert!(Npy.read(&with_header(&format!("{{'shape': {deep}"), &[])).is_err());
+    assert!(points_of(&Npy, &with_header(&format!("{{'shape': {deep}"), &[])).is_err());
 }

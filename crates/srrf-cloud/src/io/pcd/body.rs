@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::super::FormatError;
 use super::super::scan::{ByteLines, Line, number, quote};
+use super::super::{Contents, FormatError, ReadOptions};
 use super::header::{PcdEncoding, PcdHeader};
 use super::lzf;
 
@@ -17,7 +17,7 @@ pub(super) struct PcdTable<'a> {
 impl<'a> PcdTable<'a> {
     /// # Errors
     /// [`FormatError`] where there are other numbers than the header announces.
-    pub fn new(bytes: &'a [u8], header: &PcdHeader) -> Result<Self, FormatError> {
+    pub fn new(bytes: &'a [u8], header: &PcdHeader, options: &ReadOptions) -> Result<Self, FormatError> {
         let rest = bytes.get(header.body..).unwrap_or_default();
         let announced = || {
             let stride =
@@ -57,6 +57,7 @@ impl<'a> PcdTable<'a> {
         let body = rest[8..].get(..packed).ok_or_else(|| {
             FormatError::truncated(format!("{packed} bytes of compressed data"), format!("{found} bytes"))
         })?;
+        options.check_memory("the unpacked points", bytes.len(), size)?;
         let unpacked = lzf::decompress(body, size)
             .ok_or_else(|| FormatError::Content("the compressed data are damaged".into()))?;
         for field in &header.fields {
@@ -132,22 +133,34 @@ pub(super) fn numbers(
 }
 
 /// The points of a PCD file.
-pub(super) fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
     if !bytes.iter().find(|b| !b.is_ascii_whitespace()).is_some_and(|b| b"#VFC".contains(b)) {
         let begin = quote(&bytes[..bytes.len().min(20)]);
         return Err(FormatError::Content(format!("the file begins with {begin}, not with a PCD header")));
     }
     let header = PcdHeader::parse(bytes)?;
     let axes = header.axes()?;
+    let contents = |points| Contents {
+        points,
+        single: axes.iter().all(|&axis| header.fields[axis].scalar.is_single()),
+        viewpoint: header.viewpoint,
+        grid: header.grid,
+        ..Contents::default()
+    };
     if header.encoding != PcdEncoding::Ascii {
-        return Ok(PcdTable::new(bytes, &header)?.triples(&header, axes));
+        let table = PcdTable::new(bytes, &header, options)?;
+        let held = bytes.len() + if matches!(table.bytes, Cow::Owned(_)) { table.bytes.len() } else { 0 };
+        options.check_points(held, header.points)?;
+        return Ok(contents(table.triples(&header, axes)));
     }
     let columns = axes.map(|axis| column(&header, axis));
     // The count is not trusted with memory: a number takes two bytes or more.
-    let mut points = Vec::with_capacity(header.points.min((bytes.len() - header.body) / 6 + 1));
+    let most = header.points.min((bytes.len() - header.body) / 6 + 1);
+    options.check_points(bytes.len(), most)?;
+    let mut points = Vec::with_capacity(most);
     ascii_rows(bytes, &header, |line, words| {
         points.push(numbers(line, words, columns)?);
         Ok::<_, FormatError>(())
     })?;
-    Ok(points)
+    Ok(contents(points))
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::super::FormatError;
 use super::super::scalar::Scalar;
-use super::super::scan::{ByteLines, Line, quote};
+use super::super::scan::{ByteLines, Line, number, quote};
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum PcdEncoding {
@@ -35,6 +35,10 @@ pub(super) struct PcdHeader {
     /// Offset of the first byte behind the header, and the number of its lines.
     pub body: usize,
     pub lines: usize,
+    /// Width and height of an organised cloud.
+    pub grid: Option<[usize; 2]>,
+    /// Where the scanner stood, if that is not left at its default.
+    pub viewpoint: Option<[f64; 3]>,
 }
 
 /// The words of the lines, each with its place.
@@ -47,6 +51,7 @@ struct Words<'a> {
     width: Option<u64>,
     height: Option<u64>,
     points: Option<u64>,
+    viewpoint: Option<[f64; 3]>,
 }
 
 impl PcdHeader {
@@ -55,13 +60,14 @@ impl PcdHeader {
     pub fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
         let mut lines = ByteLines::of_header(bytes);
         let mut words = Words::default();
-        let mut number = 0;
+        let mut last = 0;
         while let Some(line) = lines.next() {
-            number = line.number;
+            last = line.number;
             let mut tail = line.words();
             let Some((_, key)) = tail.next().filter(|(_, key)| !key.starts_with(b"#")) else { continue };
             match key {
-                b"VERSION" | b"VIEWPOINT" => {}
+                b"VERSION" => {}
+                b"VIEWPOINT" => words.viewpoint = viewpoint(tail.map(|(_, word)| word)),
                 b"FIELDS" | b"COLUMNS" => words.fields = tail.map(|(_, word)| word).collect(),
                 b"SIZE" => words.sizes = tail.map(|(at, word)| (at..at + word.len(), word)).collect(),
                 b"TYPE" => words.types = tail.map(|(at, word)| (at..at + word.len(), word)).collect(),
@@ -79,12 +85,21 @@ impl PcdHeader {
                         _ => return Err(line.error("DATA is none of ascii, binary, binary_compressed")),
                     };
                     let (fields, points) = (words.fields(&line)?, words.points(&line)?);
-                    return Ok(Self { fields, points, encoding, body: lines.offset(), lines: number });
+                    let (grid, viewpoint) = (words.grid(), words.viewpoint);
+                    return Ok(Self {
+                        fields,
+                        points,
+                        encoding,
+                        body: lines.offset(),
+                        lines: last,
+                        grid,
+                        viewpoint,
+                    });
                 }
                 _ => return Err(line.error(format!("{} is not a line of a PCD header", quote(key)))),
             }
         }
-        Err(FormatError::truncated("a header that ends with a line `DATA`", format!("{number} lines")))
+        Err(FormatError::truncated("a header that ends with a line `DATA`", format!("{last} lines")))
     }
 
     /// The index of the field of this name.
@@ -121,7 +136,20 @@ fn single(line: &Line) -> Result<u64, FormatError> {
     count(line, word.1)
 }
 
+/// The place of a viewpoint `x y z qw qx qy qz`; `None` for the default, and for one that cannot be read.
+fn viewpoint<'a>(words: impl Iterator<Item = &'a [u8]>) -> Option<[f64; 3]> {
+    let numbers: Vec<f64> = words.map_while(|word| number(word).ok()).collect();
+    let [x, y, z, rotation @ ..] = &numbers[..] else { return None };
+    let default = [x, y, z].iter().all(|c| **c == 0.0) && matches!(rotation, [] | [1.0, 0.0, 0.0, 0.0, ..]);
+    (!default && numbers.iter().all(|c| c.is_finite())).then_some([*x, *y, *z])
+}
+
 impl Words<'_> {
+    fn grid(&self) -> Option<[usize; 2]> {
+        let [width, height] = [self.width?, self.height?].map(|side| usize::try_from(side).ok());
+        Some([width?, height?]).filter(|[_, height]| *height > 1)
+    }
+
     fn fields(&self, line: &Line) -> Result<Vec<Field>, FormatError> {
         let n = self.fields.len();
         let counts = if self.counts.is_empty() { vec![1; n] } else { self.counts.clone() };

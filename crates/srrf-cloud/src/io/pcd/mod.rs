@@ -7,7 +7,7 @@ mod rewrite;
 
 use std::io::{self, Write};
 
-use super::{CloudFormat, FormatError};
+use super::{CloudFormat, Contents, FormatError, ReadOptions};
 use crate::Rigid;
 
 /// PCD files; the points are the fields `x`, `y` and `z`, wherever and of whatever type they are.
@@ -28,8 +28,8 @@ impl CloudFormat for Pcd {
         bytes.starts_with(b"# .PCD") || bytes.starts_with(b"VERSION ") || bytes.starts_with(b"FIELDS ")
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
-        body::read(bytes)
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
+        body::read(bytes, options)
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
@@ -42,8 +42,14 @@ impl CloudFormat for Pcd {
         points.iter().flatten().try_for_each(|c| out.write_all(&c.to_le_bytes()))
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-        rewrite::rewrite(bytes, motion, out)
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
+        rewrite::rewrite(bytes, options, motion, out)
     }
 }
 

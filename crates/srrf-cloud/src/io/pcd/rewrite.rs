@@ -2,9 +2,9 @@
 
 use std::io::{self, Write};
 
-use super::super::FormatError;
 use super::super::scalar::Scalar;
 use super::super::scan::{Splice, moved, turned};
+use super::super::{FormatError, ReadOptions};
 use super::body::{PcdTable, ascii_rows, column, numbers, read};
 use super::header::{PcdEncoding, PcdHeader};
 use super::lzf;
@@ -20,8 +20,13 @@ struct PcdChange {
 
 /// Writes the file in `bytes` with its points moved by `motion` and its normals turned; all else
 /// stays. A coordinate whose type cannot hold the moved numbers becomes a double.
-pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-    let old = read(bytes)?;
+pub(super) fn rewrite(
+    bytes: &[u8],
+    options: &ReadOptions,
+    motion: &Rigid,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let old = read(bytes, options)?.points;
     let header = PcdHeader::parse(bytes)?;
     let axes = header.axes()?;
     let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
@@ -44,7 +49,7 @@ pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::
             None
         }
         PcdEncoding::Binary | PcdEncoding::Compressed => {
-            let table = PcdTable::new(bytes, &header)?;
+            let table = PcdTable::new(bytes, &header, options)?;
             if let Some(fields) = normals {
                 changes.push(turn(&header, fields, table.triples(&header, fields), motion));
             }

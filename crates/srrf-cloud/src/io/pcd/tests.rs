@@ -1,4 +1,5 @@
 use super::*;
+use crate::io::testing::{moved_copy, points_of};
 
 const HEAD: &str = "# .PCD v0.7\nVERSION 0.7\nFIELDS normal_y rgb z hist x normal_x normal_z y\nSIZE 4 4 8 2 4 4 4 2\n\
                     TYPE F U F U F F F I\nCOUNT 1 1 1 2 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\n";
@@ -43,7 +44,7 @@ fn ascii() -> Vec<u8> {
 fn three_encodings() {
     for bytes in [ascii(), binary(), compressed()] {
         assert!(Pcd.recognises(&bytes));
-        assert_eq!(Pcd.read(&bytes).unwrap(), POINTS);
+        assert_eq!(points_of(&Pcd, &bytes).unwrap(), POINTS);
     }
 }
 
@@ -53,7 +54,7 @@ fn a_compressed_file_by_hand() {
     let mut bytes = b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA binary_compressed\n".to_vec();
     bytes.extend([13, 0, 0, 0, 12, 0, 0, 0, 11]);
     [1.0f32, 2.0, 3.0].iter().for_each(|v| bytes.extend(v.to_le_bytes()));
-    assert_eq!(Pcd.read(&bytes).unwrap(), [[1.0, 2.0, 3.0]]);
+    assert_eq!(points_of(&Pcd, &bytes).unwrap(), [[1.0, 2.0, 3.0]]);
 }
 
 #[test]
@@ -65,16 +66,16 @@ fn a_moved_copy_keeps_the_rest() {
     let expected = POINTS.map(|p| motion.apply(&p));
     for bytes in [ascii(), binary(), compressed()] {
         let mut same = Vec::new();
-        Pcd.rewrite(&bytes, &Rigid::identity(), &mut same).unwrap();
+        moved_copy(&Pcd, &bytes, &Rigid::identity(), &mut same).unwrap();
         assert_eq!(same, bytes);
         let mut copy = Vec::new();
-        Pcd.rewrite(&bytes, &motion, &mut copy).unwrap();
-        assert_eq!(Pcd.read(&copy).unwrap(), expected);
+        moved_copy(&Pcd, &bytes, &motion, &mut copy).unwrap();
+        assert_eq!(points_of(&Pcd, &copy).unwrap(), expected);
         let head = header::PcdHeader::parse(&copy).unwrap();
         let sizes: Vec<usize> = head.fields.iter().map(header::Field::bytes).collect();
         assert_eq!(sizes, [4, 4, 8, 4, 4, 4, 4, 8], "y needs a fraction now; x does not need more");
         if head.encoding != header::PcdEncoding::Ascii {
-            let table = body::PcdTable::new(&copy, &head).unwrap();
+            let table = body::PcdTable::new(&copy, &head, &ReadOptions::default()).unwrap();
             let normals = table.triples(&head, head.triple(["normal_x", "normal_y", "normal_z"]).unwrap());
             assert_eq!(normals, [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]);
             let at = table.place(3, 1);
@@ -93,10 +94,10 @@ fn a_moved_copy_keeps_the_rest() {
 fn files_cut_short() {
     for bytes in [ascii(), binary(), compressed()] {
         for length in 0..bytes.len() - 2 {
-            assert!(Pcd.read(&bytes[..length]).is_err(), "{length}");
+            assert!(points_of(&Pcd, &bytes[..length]).is_err(), "{length}");
         }
     }
-    let error = Pcd.read(&binary()[..binary().len() - 1]).unwrap_err().to_string();
+    let error = points_of(&Pcd, &binary()[..binary().len() - 1]).unwrap_err().to_string();
     assert!(error.contains("2 points of 34 bytes announced"), "{error}");
 }
 
@@ -106,7 +107,7 @@ fn headers_that_lie() {
         let text: Vec<u8> = bytes.iter().map(|&b| if b.is_ascii() { b } else { 0 }).collect();
         let at = String::from_utf8(text).unwrap().find(from).unwrap();
         let changed = [&bytes[..at], to.as_bytes(), &bytes[at + from.len()..]].concat();
-        Pcd.read(&changed).unwrap_err().to_string()
+        points_of(&Pcd, &changed).unwrap_err().to_string()
     };
     assert!(error("WIDTH 2", "WIDTH 3", ascii()).contains("must agree"));
     assert!(error("SIZE 4 4", "SIZE 4", ascii()).contains("SIZE has 7 words"));

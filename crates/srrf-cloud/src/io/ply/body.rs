@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use super::super::FormatError;
 use super::super::scalar::Scalar;
 use super::super::scan::number;
+use super::super::{Contents, FormatError, ReadOptions};
+use super::faces::Faces;
 use super::header::{Element, PlyEncoding, PlyHeader, Property};
 
 /// A place in the body that moves on number by number.
@@ -19,15 +20,15 @@ impl<'a> Cursor<'a> {
     pub fn at_vertices<'h>(
         bytes: &'a [u8],
         header: &'h PlyHeader,
-    ) -> Result<(Self, &'h Element, bool), FormatError> {
+    ) -> Result<(Self, &'h Element), FormatError> {
         let mut cursor = Self { bytes, at: header.body, encoding: header.encoding };
-        for (index, element) in header.elements.iter().enumerate() {
+        for element in &header.elements {
             if element.name == "vertex" {
-                return Ok((cursor, element, index + 1 == header.elements.len()));
+                return Ok((cursor, element));
             }
             cursor.skip_element(element)?;
         }
-        Err(FormatError::Content("the file has no element `vertex`: it holds no points".into()))
+        Err(no_vertices())
     }
 
     /// The place of the next number; `None` at the end.
@@ -61,13 +62,32 @@ impl<'a> Cursor<'a> {
     }
 
     /// The line that holds the byte at `at`, from 1.
-    fn line(&self, at: usize) -> usize {
+    pub fn line(&self, at: usize) -> usize {
         1 + self.bytes[..at].iter().filter(|&&b| b == b'\n').count()
     }
 
     /// Passes over a property; its place if it is a scalar. `None` at the end of the file.
     pub fn property(&mut self, property: &Property) -> Result<Option<Range<usize>>, FormatError> {
         let Some(length) = property.length else { return Ok(self.next(property.scalar)) };
+        let Some((place, count)) = self.count(length, property)? else { return Ok(None) };
+        if let PlyEncoding::Binary { .. } = self.encoding {
+            // More than there are bytes is the end of the file.
+            let bytes = count.checked_mul(property.scalar.size());
+            return Ok(bytes.filter(|&n| n <= self.bytes.len() - self.at).map(|n| {
+                self.at += n;
+                place
+            }));
+        }
+        let whole = (0..count).all(|_| self.next(property.scalar).is_some());
+        Ok(whole.then_some(place))
+    }
+
+    /// The length of a list, and where it is. `None` at the end of the file.
+    pub fn count(
+        &mut self,
+        length: Scalar,
+        property: &Property,
+    ) -> Result<Option<(Range<usize>, usize)>, FormatError> {
         let Some(place) = self.next(length) else { return Ok(None) };
         let count = self.value(&place, length)?;
         if !(count >= 0.0 && count.fract() == 0.0) {
@@ -79,16 +99,8 @@ impl<'a> Cursor<'a> {
                 }
             });
         }
-        if let PlyEncoding::Binary { .. } = self.encoding {
-            // A float count saturates; more than there are bytes is the end of the file.
-            let bytes = (count as usize).checked_mul(property.scalar.size());
-            return Ok(bytes.filter(|&n| n <= self.bytes.len() - self.at).map(|n| {
-                self.at += n;
-                place
-            }));
-        }
-        let whole = (0..count as u64).all(|_| self.next(property.scalar).is_some());
-        Ok(whole.then_some(place))
+        // A count in floating point saturates.
+        Ok(Some((place, count as usize)))
     }
 
     fn skip_element(&mut self, element: &Element) -> Result<(), FormatError> {
@@ -122,26 +134,63 @@ impl<'a> Cursor<'a> {
     }
 }
 
-fn cut_short(element: &Element, found: u64) -> FormatError {
+pub(super) fn cut_short(element: &Element, found: u64) -> FormatError {
     FormatError::truncated(format!("{} elements `{}`", element.count, element.name), found.to_string())
 }
 
-/// The points of a PLY file.
-pub(super) fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+/// What a PLY file holds.
+pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
     let header = PlyHeader::parse(bytes)?;
-    let (mut cursor, element, last) = Cursor::at_vertices(bytes, &header)?;
-    let axes = element
-        .triple(["x", "y", "z"])
-        .ok_or_else(|| FormatError::Content("the element `vertex` lacks x, y or z".into()))?;
+    let needed = |element: &Element| element.name == "vertex" || element.face_list().is_some();
+    let end = header.elements.iter().rposition(needed).map_or(0, |last| last + 1);
+    let vertices = header.elements.iter().find(|element| element.name == "vertex").ok_or_else(no_vertices)?;
+    let mut cursor = Cursor { bytes, at: header.body, encoding: header.encoding };
+    let mut contents = Contents::default();
+    for (index, element) in header.elements.iter().enumerate().take(end) {
+        if element.name == "vertex" {
+            contents.points = points(&mut cursor, element, index + 1 == header.elements.len(), options)?;
+        } else if let Some(list) = element.face_list() {
+            let held = bytes.len() + size_of_val(&contents.points[..]);
+            contents
+                .faces
+                .extend(Faces { element, list, vertices: vertices.count, held }.read(&mut cursor, options)?);
+        } else {
+            cursor.skip_element(element)?;
+        }
+    }
+    let axes = axes(vertices)?;
+    contents.single = axes.iter().all(|&axis| vertices.properties[axis].scalar.is_single());
+    Ok(contents)
+}
+
+fn no_vertices() -> FormatError {
+    FormatError::Content("the file has no element `vertex`: it holds no points".into())
+}
+
+fn axes(vertices: &Element) -> Result<[usize; 3], FormatError> {
+    let lacking = || FormatError::Content("the element `vertex` lacks x, y or z".into());
+    vertices.triple(["x", "y", "z"]).ok_or_else(lacking)
+}
+
+/// The points at the cursor, which moves behind them.
+fn points(
+    cursor: &mut Cursor,
+    element: &Element,
+    last: bool,
+    options: &ReadOptions,
+) -> Result<Vec<[f64; 3]>, FormatError> {
+    let axes = axes(element)?;
     let kinds = axes.map(|axis| element.properties[axis].scalar);
+    let bytes = cursor.bytes;
     let mut points = Vec::new();
-    match (header.encoding, element.stride()) {
+    match (cursor.encoding, element.stride()) {
         (PlyEncoding::Binary { big_endian }, Some(stride)) => {
             let body = &bytes[cursor.at..];
             let count = usize::try_from(element.count).unwrap_or(usize::MAX);
             if count > body.len() / stride {
                 return Err(cut_short(element, (body.len() / stride) as u64));
             }
+            options.check_points(bytes.len(), count)?;
             let offset = |axis: usize| element.properties[..axis].iter().map(|p| p.scalar.size()).sum();
             let offsets: [usize; 3] = axes.map(offset);
             let number = |row: &[u8], i: usize| kinds[i].get(row, offsets[i], big_endian).unwrap_or(f64::NAN);
@@ -152,7 +201,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
         (_, _) => {
             // The count is not trusted with memory: a number takes a byte or more.
             let most = (bytes.len() - cursor.at) / element.properties.len();
-            points.reserve(most.min(usize::try_from(element.count).unwrap_or(usize::MAX)));
+            let most = most.min(usize::try_from(element.count).unwrap_or(usize::MAX));
+            options.check_points(bytes.len(), most)?;
+            points.reserve(most);
             cursor.rows(element, |cursor, places| {
                 let value = |i: usize| cursor.value(&places[axes[i]], kinds[i]);
                 points.push([value(0)?, value(1)?, value(2)?]);
@@ -161,7 +212,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
         }
     }
     // With lists, any bytes behind the rows could be read as one more.
-    let countable = header.encoding == PlyEncoding::Ascii || element.stride().is_some();
+    let countable = cursor.encoding == PlyEncoding::Ascii || element.stride().is_some();
     if last && countable && element.properties.iter().all(|p| matches!(cursor.property(p), Ok(Some(_)))) {
         let problem = format!(
             "{} elements `vertex` announced, but more rows follow; correct the count in the header",

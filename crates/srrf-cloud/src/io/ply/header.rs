@@ -35,6 +35,13 @@ impl Element {
         Some([a?, b?, c?])
     }
 
+    /// The index of the list that names the corners of faces.
+    pub fn face_list(&self) -> Option<usize> {
+        let is_faces = ["face", "faces", "tristrips"].contains(&self.name.as_str());
+        let named = |p: &Property| ["vertex_indices", "vertex_index"].contains(&p.name.as_str());
+        self.properties.iter().position(|p| p.length.is_some() && named(p)).filter(|_| is_faces)
+    }
+
     /// Bytes of a row, if all rows have as many.
     pub fn stride(&self) -> Option<usize> {
         let size = |p: &Property| p.length.is_none().then(|| p.scalar.size());

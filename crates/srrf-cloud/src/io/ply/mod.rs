@@ -1,12 +1,13 @@
 //! PLY, the Stanford polygon format: text, and binary of both byte orders.
 
 mod body;
+mod faces;
 mod header;
 mod rewrite;
 
 use std::io::{self, Write};
 
-use super::{CloudFormat, FormatError};
+use super::{CloudFormat, Contents, FormatError, ReadOptions};
 use crate::Rigid;
 
 /// PLY files; the points are the `x`, `y` and `z` of the element `vertex`, whatever else it and the
@@ -27,8 +28,8 @@ impl CloudFormat for Ply {
         bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r")
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
-        body::read(bytes)
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
+        body::read(bytes, options)
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
@@ -38,14 +39,21 @@ impl CloudFormat for Ply {
         points.iter().flatten().try_for_each(|c| out.write_all(&c.to_le_bytes()))
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-        rewrite::rewrite(bytes, motion, out)
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
+        rewrite::rewrite(bytes, options, motion, out)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::testing::{moved_copy, points_of};
 
     const POINTS: [[f64; 3]; 2] = [[1.5, -2.0, 0.25], [4.0, 5.0, -6.5]];
 
@@ -68,7 +76,7 @@ mod tests {
             bytes.extend(value);
         };
         put(&[3]);
-        (0i16..3).for_each(|i| put(&i.to_le_bytes()));
+        [0i16, 1, 0].iter().for_each(|i| put(&i.to_le_bytes()));
         for [x, y, z] in POINTS {
             put(&[200]);
             put(&(y as f32).to_le_bytes());
@@ -80,10 +88,10 @@ mod tests {
 
     #[test]
     fn three_encodings() {
-        let text = format!("{}3 0 1 2\n200 -2 1.5 0.25\n200 5 4\n -6.5\n", header("ascii"));
-        assert_eq!(Ply.read(text.as_bytes()).unwrap(), POINTS);
-        assert_eq!(Ply.read(&binary(false)).unwrap(), POINTS);
-        assert_eq!(Ply.read(&binary(true)).unwrap(), POINTS);
+        let text = format!("{}3 0 1 0\n200 -2 1.5 0.25\n200 5 4\n -6.5\n", header("ascii"));
+        assert_eq!(points_of(&Ply, text.as_bytes()).unwrap(), POINTS);
+        assert_eq!(points_of(&Ply, &binary(false)).unwrap(), POINTS);
+        assert_eq!(points_of(&Ply, &binary(true)).unwrap(), POINTS);
     }
 
     #[test]
@@ -91,17 +99,17 @@ mod tests {
         for big_endian in [false, true] {
             let whole = binary(big_endian);
             for length in 0..whole.len() {
-                assert!(Ply.read(&whole[..length]).is_err(), "{length}");
+                assert!(points_of(&Ply, &whole[..length]).is_err(), "{length}");
             }
         }
-        let error = Ply.read(&binary(false)[..binary(false).len() - 1]).unwrap_err().to_string();
+        let error = points_of(&Ply, &binary(false)[..binary(false).len() - 1]).unwrap_err().to_string();
         assert!(error.contains("2 elements `vertex` announced, 1 found"), "{error}");
     }
 
     #[test]
     fn headers_that_lie() {
         let head = |body: &str| format!("ply\nformat binary_little_endian 1.0\n{body}\nend_header\n");
-        let error = |body: &str| Ply.read(head(body).as_bytes()).unwrap_err().to_string();
+        let error = |body: &str| points_of(&Ply, head(body).as_bytes()).unwrap_err().to_string();
         let axes = "property float x\nproperty float y\nproperty float z";
         assert!(error(&format!("element vertex 18446744073709551615\n{axes}")).contains("cut short"));
         assert!(error(&format!("element vertex -3\n{axes}")).contains("line 3"));
@@ -113,8 +121,8 @@ mod tests {
         assert!(
             error(&format!("element ghost 18446744073709551615\nelement vertex 9\n{axes}")).contains("cut")
         );
-        assert!(Ply.read(b"solid").is_err() && Ply.read(b"").is_err());
-        assert!(Ply.read(b"ply\nelement vertex 0\nend_header\n").is_err());
+        assert!(points_of(&Ply, b"solid").is_err() && points_of(&Ply, b"").is_err());
+        assert!(points_of(&Ply, b"ply\nelement vertex 0\nend_header\n").is_err());
     }
 
     #[test]
@@ -125,7 +133,7 @@ mod tests {
         };
         let copy = |bytes: &[u8], motion: &Rigid| {
             let mut out = Vec::new();
-            Ply.rewrite(bytes, motion, &mut out).unwrap();
+            moved_copy(&Ply, bytes, motion, &mut out).unwrap();
             out
         };
         let text = "ply\r\nformat ascii 1.0\nelement vertex 2\nproperty float nz\nproperty float x\nproperty float ny\n\
@@ -137,7 +145,7 @@ mod tests {
         for bytes in [binary(false), binary(true)] {
             assert_eq!(copy(&bytes, &Rigid::identity()), bytes);
             let moved = copy(&bytes, &motion);
-            assert_eq!(Ply.read(&moved).unwrap(), POINTS.map(|p| motion.apply(&p)));
+            assert_eq!(points_of(&Ply, &moved).unwrap(), POINTS.map(|p| motion.apply(&p)));
             // y became a double in each of two rows; the word `double` is longer by one letter.
             assert_eq!(moved.len(), bytes.len() + 2 * 4 + 1);
             assert_eq!(copy(&moved, &motion.inverse()).len(), moved.len());
@@ -146,12 +154,12 @@ mod tests {
 
     #[test]
     fn rows_that_are_too_many() {
-        let text = format!("{}3 0 1 2\n200 -2 1.5 0.25\n200 5 4 -6.5\n", header("ascii"));
+        let text = format!("{}3 0 1 0\n200 -2 1.5 0.25\n200 5 4 -6.5\n", header("ascii"));
         let (start, end) = text.split_once("element edge").unwrap();
         let body = end.split_once("end_header\n").unwrap().1;
         let only = format!("{start}end_header\n{body}");
-        assert_eq!(Ply.read(only.as_bytes()).unwrap(), POINTS);
-        let error = Ply.read(format!("{only}200 5 4 -6.5\n").as_bytes()).unwrap_err().to_string();
+        assert_eq!(points_of(&Ply, only.as_bytes()).unwrap(), POINTS);
+        let error = points_of(&Ply, format!("{only}200 5 4 -6.5\n").as_bytes()).unwrap_err().to_string();
         assert!(error.contains("more rows follow"), "{error}");
     }
 }

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 use std::ops::Range;
 
+use super::super::ReadOptions;
 use super::super::scalar::Scalar;
 use super::super::scan::{Splice, moved, put_number, turned};
 use super::body::{Cursor, read};
@@ -21,10 +22,15 @@ struct PlyChange {
 /// Writes the file in `bytes` with its points moved by `motion` and its normals (`nx`, `ny`, `nz`)
 /// turned; every other byte stays. A coordinate whose type cannot hold the moved numbers becomes
 /// `double`.
-pub(super) fn rewrite(bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-    let points = read(bytes)?;
+pub(super) fn rewrite(
+    bytes: &[u8],
+    options: &ReadOptions,
+    motion: &Rigid,
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    let points = read(bytes, options)?.points;
     let header = PlyHeader::parse(bytes)?;
-    let (mut cursor, element, _) = Cursor::at_vertices(bytes, &header)?;
+    let (mut cursor, element) = Cursor::at_vertices(bytes, &header)?;
     let Some(axes) = element.triple(["x", "y", "z"]) else { return Err(io::ErrorKind::InvalidData.into()) };
     let normals = element.triple(["nx", "ny", "nz"]);
     let new_points: Vec<[f64; 3]> = points.iter().map(|&p| moved(motion, p)).collect();

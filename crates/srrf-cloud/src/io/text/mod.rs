@@ -6,7 +6,7 @@ use std::io::{self, Write};
 
 use self::row::{Style, TextRow};
 use super::scan::{ByteLines, Line, Splice, moved, write_rows};
-use super::{CloudFormat, FormatError};
+use super::{CloudFormat, Contents, FormatError, ReadOptions};
 use crate::Rigid;
 
 /// Numbers separated by spaces, tabs, commas or semicolons, a line for each point. x, y and z are
@@ -41,9 +41,10 @@ impl CloudFormat for Text {
             && rows > 0
     }
 
-    fn read(&self, bytes: &[u8]) -> Result<Vec<[f64; 3]>, FormatError> {
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
         let mut points = Vec::new();
         let announced = parse(bytes, |_, row| {
+            options.grow("the points", bytes.len(), &mut points)?;
             points.push(row.point);
             Ok::<_, FormatError>(())
         })?;
@@ -51,7 +52,7 @@ impl CloudFormat for Text {
             Some(count) if points.len() != count => {
                 Err(FormatError::truncated(format!("{count} points"), points.len().to_string()))
             }
-            _ => Ok(points),
+            _ => Ok(Contents::of_points(points)),
         }
     }
 
@@ -59,8 +60,14 @@ impl CloudFormat for Text {
         write_rows(points, "", out)
     }
 
-    fn rewrite(&self, bytes: &[u8], motion: &Rigid, out: &mut dyn Write) -> io::Result<()> {
-        self.read(bytes)?;
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
+        self.read(bytes, options)?;
         let mut splice = Splice::new(bytes, out);
         parse(bytes, |line, row| {
             splice.decimal_comma = match row.style {
@@ -167,9 +174,10 @@ pub fn parse_point(line: &str) -> Result<[f64; 3], String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::testing::{moved_copy, points_of};
 
     fn read(text: &str) -> Result<Vec<[f64; 3]>, FormatError> {
-        Text.read(text.as_bytes())
+        points_of(&Text, text.as_bytes())
     }
 
     #[test]
@@ -203,8 +211,8 @@ mod tests {
         assert!(read("1\n1 2 3\n4 5 6").is_err());
         assert!(read("a b c\nd e f\n1 2 3").unwrap_err().to_string().contains("line 2"));
         assert!(read("1,5,2,5,3,5\n1,2,5,3,5\n").unwrap_err().to_string().contains("line 2"));
-        assert!(Text.read(&[0xff, 0xfe, 0x31, 0x00]).unwrap_err().to_string().contains("UTF-16"));
-        assert!(Text.read(&[0x31, 0x20, 0xff, 0x20, 0x32]).is_err());
+        assert!(points_of(&Text, &[0xff, 0xfe, 0x31, 0x00]).unwrap_err().to_string().contains("UTF-16"));
+        assert!(points_of(&Text, &[0x31, 0x20, 0xff, 0x20, 0x32]).is_err());
         assert_eq!(read(""), Ok(vec![]));
     }
 
@@ -213,7 +221,7 @@ mod tests {
         let motion = Rigid { translation: [1.0, 0.5, -2.0].into(), ..Rigid::identity() };
         let copy = |text: &str| {
             let mut out = Vec::new();
-            Text.rewrite(text.as_bytes(), &motion, &mut out).unwrap();
+            moved_copy(&Text, text.as_bytes(), &motion, &mut out).unwrap();
             String::from_utf8(out).unwrap()
         };
         assert_eq!(copy("#  a\r\n1.0, 2, 3, 255 ,0\r\n\r\n"), "#  a\r\n2, 2.5, 1, 255 ,0\r\n\r\n");

@@ -1,0 +1,209 @@
+//! [`Contents`]: what a file holds.
+
+use std::fmt;
+
+use super::options::PointLayout;
+use crate::Rigid;
+
+/// What a file holds.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Contents {
+    /// The points in the order of the file, any numbers; shape `[n, 3]`. Of a mesh, its vertices.
+    pub points: Vec<[f64; 3]>,
+    /// Triangles of a mesh, as indices of `points`; shape `[m, 3]`. Polygons become fans. Empty for clouds.
+    pub faces: Vec<[u32; 3]>,
+    /// Whether single precision holds every coordinate, by the types in the file.
+    pub single: bool,
+    /// Where the scanner stood, in the frame of the points; `None` where the file does not say.
+    pub viewpoint: Option<[f64; 3]>,
+    /// Width and height of an organised cloud, whose points come row by row.
+    pub grid: Option<[usize; 2]>,
+    /// What a user should know of the reading.
+    pub notes: Vec<Note>,
+}
+
+impl Contents {
+    /// Of points in double precision, and nothing else.
+    pub fn of_points(points: Vec<[f64; 3]>) -> Self {
+        Self { points, ..Self::default() }
+    }
+
+    /// Takes the points away that have NaN or infinite coordinates, with the faces at them, and says how many they
+    /// were. A cloud that loses points is no longer organised.
+    pub fn drop_not_finite(&mut self) -> usize {
+        let before = self.points.len();
+        let finite = |p: &[f64; 3]| p.iter().all(|c| c.is_finite());
+        if self.points.iter().all(finite) {
+            return 0;
+        }
+        if !self.faces.is_empty() {
+            let mut next = 0u32;
+            let places: Vec<Option<u32>> = self
+                .points
+                .iter()
+                .map(|p| {
+                    finite(p).then(|| {
+                        next += 1;
+                        next - 1
+                    })
+                })
+                .collect();
+            let place = |corner: u32| places.get(corner as usize).copied().flatten();
+            self.faces =
+                self.faces.iter().filter_map(|&[a, b, c]| Some([place(a)?, place(b)?, place(c)?])).collect();
+        }
+        self.points.retain(finite);
+        self.grid = None;
+        before - self.points.len()
+    }
+}
+
+/// What a user should know of a reading. [`fmt::Display`] gives a sentence.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Note {
+    /// Something in the file was passed over.
+    Ignored {
+        /// What, such as `3 lines that begin with "foo"`.
+        what: String,
+    },
+    /// Bytes behind the end.
+    ExtraBytes {
+        /// How many.
+        bytes: usize,
+    },
+    /// What a point is was found by the plausibility of its numbers.
+    LayoutFound {
+        /// What was found.
+        layout: PointLayout,
+    },
+    /// The first line is a title of numbers: 0, 1, 2 and so on, as pandas writes it for columns without names.
+    NumberedTitle,
+    /// An array of other than two axes was read as a list of points.
+    Flattened {
+        /// Its shape.
+        shape: Vec<u64>,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Ignored { what } => write!(f, "passed over {what}"),
+            Self::ExtraBytes { bytes: 1 } => f.write_str("passed over 1 byte behind the end"),
+            Self::ExtraBytes { bytes } => write!(f, "passed over {bytes} bytes behind the end"),
+            Self::LayoutFound { layout } => write!(
+                f,
+                "read as {} numbers of {} a point ({layout}), the only usual layout that fits; `--layout` says another",
+                layout.numbers,
+                if layout.double { "float64" } else { "float32" }
+            ),
+            Self::NumberedTitle => {
+                f.write_str("the first line, 0, 1, 2 and so on, was taken for a title and not for a point")
+            }
+            Self::Flattened { shape } => write!(f, "an array of shape {shape:?}, read as a list of points"),
+        }
+    }
+}
+
+/// One of several scans in a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanEntry {
+    /// Its name; empty where it has none.
+    pub name: String,
+    /// Number of its points.
+    pub points: u64,
+    /// From the scanner's frame to that of the file, where the file has it.
+    pub pose: Option<Rigid>,
+}
+
+/// What the points of a file have besides their place: one value a point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attribute {
+    /// In small letters: `red`, `green`, `blue`, `alpha`, `intensity`, `nx`, `ny`, `nz`, or as the file has it.
+    pub name: String,
+    /// The values, as many as points.
+    pub values: AttributeValues,
+}
+
+/// Values of one type.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AttributeValues {
+    /// `int8`
+    I8(Vec<i8>),
+    /// `uint8`
+    U8(Vec<u8>),
+    /// `int16`
+    I16(Vec<i16>),
+    /// `uint16`
+    U16(Vec<u16>),
+    /// `int32`
+    I32(Vec<i32>),
+    /// `uint32`
+    U32(Vec<u32>),
+    /// `int64`
+    I64(Vec<i64>),
+    /// `uint64`
+    U64(Vec<u64>),
+    /// `float32`
+    F32(Vec<f32>),
+    /// `float64`
+    F64(Vec<f64>),
+}
+
+impl AttributeValues {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::I8(v) => v.len(),
+            Self::U8(v) => v.len(),
+            Self::I16(v) => v.len(),
+            Self::U16(v) => v.len(),
+            Self::I32(v) => v.len(),
+            Self::U32(v) => v.len(),
+            Self::I64(v) => v.len(),
+            Self::U64(v) => v.len(),
+            Self::F32(v) => v.len(),
+            Self::F64(v) => v.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// A value as `f64` (64-bit integers are rounded); `None` past the end.
+    pub fn get(&self, index: usize) -> Option<f64> {
+        match self {
+            Self::I8(v) => v.get(index).map(|&v| v.into()),
+            Self::U8(v) => v.get(index).map(|&v| v.into()),
+            Self::I16(v) => v.get(index).map(|&v| v.into()),
+            Self::U16(v) => v.get(index).map(|&v| v.into()),
+            Self::I32(v) => v.get(index).map(|&v| v.into()),
+            Self::U32(v) => v.get(index).map(|&v| v.into()),
+            Self::I64(v) => v.get(index).map(|&v| v as f64),
+            Self::U64(v) => v.get(index).map(|&v| v as f64),
+            Self::F32(v) => v.get(index).map(|&v| v.into()),
+            Self::F64(v) => v.get(index).copied(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faces_follow_their_points() {
+        let mut contents = Contents {
+            points: vec![[0.0; 3], [f64::NAN; 3], [1.0; 3], [2.0; 3], [3.0, f64::INFINITY, 0.0]],
+            faces: vec![[0, 2, 3], [0, 1, 2], [2, 3, 4], [3, 2, 0]],
+            grid: Some([5, 1]),
+            ..Contents::default()
+        };
+        assert_eq!(contents.drop_not_finite(), 2);
+        assert_eq!(contents.points, [[0.0; 3], [1.0; 3], [2.0; 3]]);
+        assert_eq!((contents.faces.as_slice(), contents.grid), (&[[0, 1, 2], [2, 1, 0]][..], None));
+        assert_eq!(contents.drop_not_finite(), 0);
+    }
+}
