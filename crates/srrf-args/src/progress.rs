@@ -68,7 +68,7 @@ impl Look {
 
 /// What is being done.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Step {
+struct ProgressStep {
     what: String,
     /// How much of it is done, and how much there is; 0 where nobody knows.
     done: usize,
@@ -76,7 +76,7 @@ struct Step {
     unit: &'static str,
 }
 
-impl Step {
+impl ProgressStep {
     /// One line.
     fn line(&self, seconds: u64) -> String {
         let amount = match self.total {
@@ -105,8 +105,8 @@ impl LineClock {
 }
 
 #[derive(Debug)]
-struct State {
-    step: Option<Step>,
+struct ProgressState {
+    step: Option<ProgressStep>,
     ended: bool,
     bar: Option<ProgressBar>,
     lines: LineClock,
@@ -116,16 +116,16 @@ struct State {
 struct Shared {
     look: Look,
     begun: Instant,
-    state: Mutex<State>,
+    state: Mutex<ProgressState>,
     changed: Condvar,
 }
 
 impl Shared {
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, ProgressState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn write(&self, step: &Step) {
+    fn write(&self, step: &ProgressStep) {
         // Who has closed standard error does not want to know.
         let _ = writeln!(io::stderr(), "{}", step.line(self.begun.elapsed().as_secs()));
     }
@@ -154,7 +154,7 @@ impl Shared {
 }
 
 /// Brings the bar in line with the step.
-fn show_bar(state: &mut State) {
+fn show_bar(state: &mut ProgressState) {
     let Some(step) = &state.step else { return };
     let bar = state.bar.get_or_insert_with(ProgressBar::new_spinner);
     let template = if step.total > 0 {
@@ -185,7 +185,7 @@ pub struct Progress {
 impl Progress {
     fn new(look: Look) -> Self {
         let first = if let Look::Lines { first, .. } = look { first } else { Duration::ZERO };
-        let state = State { step: None, ended: false, bar: None, lines: LineClock { next: first } };
+        let state = ProgressState { step: None, ended: false, bar: None, lines: LineClock { next: first } };
         let (state, changed) = (Mutex::new(state), Condvar::new());
         let shared = Arc::new(Shared { look, begun: Instant::now(), state, changed });
         let ticking = shared.clone();
@@ -202,15 +202,15 @@ impl Progress {
 
     /// A step begins, whose length nobody knows, such as `reading a.ply`.
     pub fn step(&self, what: impl Into<String>) {
-        self.begin(Step { what: what.into(), done: 0, total: 0, unit: "" });
+        self.begin(ProgressStep { what: what.into(), done: 0, total: 0, unit: "" });
     }
 
     /// A step of `total` parts begins; `unit` names several of them, such as `pairs`.
     pub fn counted(&self, what: impl Into<String>, total: usize, unit: &'static str) {
-        self.begin(Step { what: what.into(), done: 0, total, unit });
+        self.begin(ProgressStep { what: what.into(), done: 0, total, unit });
     }
 
-    fn begin(&self, step: Step) {
+    fn begin(&self, step: ProgressStep) {
         if self.shared.look == Look::Off {
             return;
         }
@@ -279,7 +279,7 @@ mod tests {
 
     #[test]
     fn lines_say_what_and_how_much() {
-        let mut step = Step { what: "registering".into(), done: 1234, total: 20_000, unit: "pairs" };
+        let mut step = ProgressStep { what: "registering".into(), done: 1234, total: 20_000, unit: "pairs" };
         assert_eq!(step.line(12), "registering, 1,234 of 20,000 pairs, 12 s");
         step.total = 0;
         assert_eq!(step.line(3), "registering, 3 s");

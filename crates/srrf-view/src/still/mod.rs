@@ -113,14 +113,14 @@ fn figures(pair: &Pair<'_>) -> Vec<(String, Rgb)> {
 }
 
 /// One view: points with their colours.
-struct View {
+struct Panel {
     title: String,
     camera: Camera,
     points: Vec<([f64; 3], Rgb)>,
     scale: Option<String>,
 }
 
-impl View {
+impl Panel {
     /// Twice as large as it will be.
     fn draw(&self) -> Raster {
         let mut raster = Raster::new(2 * VIEW[0], 2 * VIEW[1], BACKGROUND);
@@ -137,7 +137,7 @@ impl View {
     }
 }
 
-fn views(pair: &Pair<'_>) -> Vec<View> {
+fn views(pair: &Pair<'_>) -> Vec<Panel> {
     let up = pair.up.unwrap_or_else(|| Up::guess(pair.target));
     let (source, target) = (drawn(pair.source), drawn(pair.target));
     let finite = |pose: &&Pose| {
@@ -153,7 +153,7 @@ fn views(pair: &Pair<'_>) -> Vec<View> {
         let all: Vec<[f64; 3]> = near(&target).chain(near(&source)).collect();
         let camera = Camera::around(&all, up, [2 * VIEW[0], 2 * VIEW[1]]);
         let points = source.into_iter().map(|p| (p, SOURCE)).chain(target.iter().map(|p| (*p, TARGET)));
-        View { title, camera, points: points.collect(), scale: None }
+        Panel { title, camera, points: points.collect(), scale: None }
     };
     let mut views = vec![view(format!("before: {}", pair.before.name), moved(before))];
     if let Some(after) = after {
@@ -172,7 +172,7 @@ fn distances(
     placed: Vec<[f64; 3]>,
     camera: Camera,
     after: &Pose,
-) -> Option<View> {
+) -> Option<Panel> {
     let distances = Distances::new(pair.target).ok()?;
     let found = Residuals::new(&distances, source, &after.target_from_source);
     let before = Residuals::new(&distances, source, &pair.before.target_from_source);
@@ -183,7 +183,7 @@ fn distances(
     let most = high.min((2.0 * best).max(middle.min(10.0 * best))).max(f64::MIN_POSITIVE);
     let length = |value: f64| with_unit(&significant(value), &pair.unit);
     let coloured = placed.into_iter().zip(&found.values).map(|(p, d)| (p, ramp(d / most)));
-    Some(View {
+    Some(Panel {
         title: "distance of the source's points to the target".into(),
         camera,
         points: coloured.chain(target.iter().map(|p| (*p, NEUTRAL))).collect(),

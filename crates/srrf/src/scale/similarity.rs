@@ -42,7 +42,7 @@ pub(crate) struct Fitted {
 }
 
 /// A cloud made ready, about its own middle.
-struct Side {
+struct FitSide {
     middle: Vector3<f64>,
     index: KnnIndex,
     normals: Vec<[f64; 3]>,
@@ -51,7 +51,7 @@ struct Side {
     radius: f64,
 }
 
-impl Side {
+impl FitSide {
     fn new(cloud: &PointCloud) -> Result<Self, CloudError> {
         let middle = cloud.middle();
         let step = cloud.len().div_ceil(KEPT);
@@ -72,8 +72,8 @@ impl Side {
 
 /// Two clouds made ready.
 pub(crate) struct SimilarityFit {
-    source: Side,
-    target: Side,
+    source: FitSide,
+    target: FitSide,
 }
 
 /// A moved source point, its match in the target, and the normal there, all about the middle of the target.
@@ -121,7 +121,7 @@ impl SimilarityFit {
     /// # Errors
     /// [`CloudError`] for clouds of fewer than three points.
     pub fn new(source: &PointCloud, target: &PointCloud) -> Result<Self, CloudError> {
-        Ok(Self { source: Side::new(source)?, target: Side::new(target)? })
+        Ok(Self { source: FitSide::new(source)?, target: FitSide::new(target)? })
     }
 
     /// Improves a similarity that is nearly right; none where the numbers give out.
