@@ -49,6 +49,7 @@ mod search;
 mod skeleton;
 mod stage;
 mod start;
+mod surface;
 mod target;
 mod warning;
 
@@ -70,6 +71,7 @@ pub use skeleton::{FoundSkeleton, skeleton};
 pub use srrf_align::Map;
 pub use stage::{Stage, StageTime};
 pub use start::Start;
+pub use surface::{Counterpart, SurfaceDraw};
 pub use target::Target;
 pub use warning::Warning;
 
