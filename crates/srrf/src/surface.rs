@@ -73,14 +73,22 @@ mod tests {
     fn a_part_is_as_dense_as_the_scan_and_a_scanned_mesh_stays_as_it_is() {
         let (corners, part) = square(1);
         // A scan with 0.0025 between points, far from the origin.
-        let scan = PointCloud::new((0..160_000).map(|i| [5e5 + 0.0025 * f64::from(i % 400), 0.0025 * f64::from(i / 400), 9.0]).collect()).unwrap();
+        let scan = PointCloud::new(
+            (0..160_000)
+                .map(|i| [5e5 + 0.0025 * f64::from(i % 400), 0.0025 * f64::from(i / 400), 9.0])
+                .collect(),
+        )
+        .unwrap();
         let drawn = SurfaceDraw::for_counterpart(&part, corners.len(), Counterpart::Cloud(&scan));
         let SurfaceDraw::Surface { points, spacing } = drawn else { panic!("{drawn:?}") };
         assert!((spacing - 0.0025).abs() < 1e-5 && points == 35_302, "{drawn:?}");
 
         let (vertices, scanned) = square(100);
         let of = |other| SurfaceDraw::for_counterpart(&scanned, vertices.len(), other);
-        let coarse = PointCloud::new((0..900).map(|i| [0.03 * f64::from(i % 30), 0.03 * f64::from(i / 30), 0.0]).collect()).unwrap();
+        let coarse = PointCloud::new(
+            (0..900).map(|i| [0.03 * f64::from(i % 30), 0.03 * f64::from(i / 30), 0.0]).collect(),
+        )
+        .unwrap();
         assert_eq!(of(Counterpart::Cloud(&coarse)), SurfaceDraw::Vertices);
         assert!(matches!(of(Counterpart::Cloud(&scan)), SurfaceDraw::Surface { points: 35_302, .. }));
         // Of another unit: nothing is known but the number of points.
