@@ -101,8 +101,8 @@ fn surfaces<S: Scans + ?Sized, R: std::error::Error + Send>(
         .into_par_iter()
         .map(|number| {
             let cloud = scans.cloud(number).map_err(|source| AlignError::Scan { number, source })?;
-            let surface =
-                ScanSurface::new(&cloud, most).map_err(|source| AlignError::Cloud { number, source })?;
+            let surface = ScanSurface::new(&cloud, most, scans.viewpoint(number))
+                .map_err(|source| AlignError::Cloud { number, source })?;
             let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             progress(AlignProgress { stage: AlignStage::Read, done, total });
             Ok(surface)

@@ -183,7 +183,8 @@ mod tests {
         let clouds: Vec<PointCloud> = (0..3)
             .map(|seed| shapes.sample(0, 4000, &mut ChaCha8Rng::seed_from_u64(seed)).unwrap())
             .collect();
-        let surfaces: Vec<ScanSurface> = clouds.iter().map(|c| ScanSurface::new(c, 2000).unwrap()).collect();
+        let surfaces: Vec<ScanSurface> =
+            clouds.iter().map(|c| ScanSurface::new(c, 2000, None).unwrap()).collect();
         // The means of the samplings differ a little: truth is in input coordinates.
         let truth: Vec<Rigid> = surfaces.iter().map(|s| crate::se3::shift(&s.centre)).collect();
         let off = |s: f64| exp(&Vector6::new(0.02, -0.03 * s, 0.01, 0.01, 0.02 * s, -0.01));

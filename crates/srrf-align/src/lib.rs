@@ -23,9 +23,11 @@ mod placed;
 mod pool;
 mod rounds;
 mod se3;
+mod sight;
 mod sparse;
 mod surface;
 mod trees;
+mod verify;
 
 pub use align::align;
 pub use consensus::EdgeVerdict;

@@ -3,9 +3,10 @@
 use rayon::prelude::*;
 use srrf_classical::fpfh::{Descriptor, WIDTH, fpfh};
 use srrf_classical::nearest_descriptors;
-use srrf_cloud::{CloudError, PointCloud, farthest_point_sampling, thin_to};
+use srrf_cloud::{CloudError, PointCloud, Rigid, farthest_point_sampling, thin_to};
 
 use crate::surface::ScanSurface;
+use crate::verify::verified;
 
 /// Points of a scan that are described.
 const DESCRIBED: usize = 1200;
@@ -138,6 +139,19 @@ fn uncommon(points: &[[f64; 3]], descriptors: &[Descriptor], mean: &Descriptor) 
     farthest_point_sampling(&half, KEPT.min(half.len()), 0).into_iter().map(|i| order[i].1).collect()
 }
 
+/// How alike two scans are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Likeness {
+    /// About how many matches agree.
+    pub value: f64,
+    /// Where those would put this scan, about the means of both.
+    pub other_from_this: Option<Rigid>,
+}
+
+impl Likeness {
+    const NONE: Self = Self { value: 0.0, other_from_this: None };
+}
+
 impl ScanDigest {
     /// Similarity of the words, in [0, 1].
     pub fn shared_words(&self, other: &Self) -> f32 {
@@ -147,7 +161,7 @@ impl ScanDigest {
     /// About how many matches keep their distances to each other: the largest eigenvalue of the graph of consistent matches, by
     /// which a few that agree stand out of many that do not. Source: Leordeanu and Hebert, "A spectral technique for
     /// correspondence problems using pairwise constraints", 2005.
-    pub fn likeness(&self, other: &Self, tolerance: f64) -> f64 {
+    pub fn likeness(&self, other: &Self, tolerance: f64) -> Likeness {
         let forth = nearest_descriptors(&self.descriptors, &other.descriptors);
         let back = nearest_descriptors(&other.descriptors, &self.descriptors);
         let matches: Vec<([f64; 3], [f64; 3])> = forth
@@ -158,7 +172,7 @@ impl ScanDigest {
             .collect();
         let n = matches.len();
         if n < 4 {
-            return 0.0;
+            return Likeness::NONE;
         }
         let mut graph = vec![Vec::new(); n];
         for i in 0..n {
@@ -175,13 +189,27 @@ impl ScanDigest {
             let next: Vec<f64> = graph.iter().map(|row| row.iter().map(|j| x[*j]).sum()).collect();
             let norm = next.iter().map(|v| v * v).sum::<f64>().sqrt();
             if norm == 0.0 {
-                return 0.0;
+                return Likeness::NONE;
             }
             value = norm / x.iter().map(|v| v * v).sum::<f64>().sqrt();
             x = next.into_iter().map(|v| v / norm).collect();
         }
-        value
+        Likeness { value, other_from_this: pose_of(&matches, &graph, &x) }
     }
+}
+
+/// The motion of the matches that agree with the strongest one and with each other, the strongest first.
+fn pose_of(matches: &[([f64; 3], [f64; 3])], graph: &[Vec<usize>], strength: &[f64]) -> Option<Rigid> {
+    let mut order: Vec<usize> = (0..matches.len()).collect();
+    order.sort_by(|a, b| strength[*b].total_cmp(&strength[*a]).then(a.cmp(b)));
+    let mut kept: Vec<usize> = Vec::new();
+    for i in order {
+        if kept.iter().all(|k| graph[*k].contains(&i)) {
+            kept.push(i);
+        }
+    }
+    let (a, b): (Vec<_>, Vec<_>) = kept.iter().map(|k| matches[*k]).unzip();
+    Rigid::fit(&a, &b, None)
 }
 
 fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
@@ -190,6 +218,8 @@ fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 
 /// How many words a scan compares before it looks at matches.
 pub const COMPARED: usize = 48;
+/// Pairs of each scan that are laid on each other for a look.
+const LOOKED_AT: usize = 32;
 /// Up to so many scans, all pairs are compared by their matches.
 pub const ALL_COMPARED: usize = 160;
 
@@ -214,10 +244,34 @@ pub fn likely_pairs(surfaces: &[ScanSurface], digests: &[ScanDigest]) -> Vec<(us
     };
     pairs.sort_unstable();
     pairs.dedup();
-    let mut scored: Vec<(usize, usize, f64)> =
+    let scored: Vec<(usize, usize, Likeness)> =
         pairs.into_par_iter().map(|(a, b)| (a, b, digests[a].likeness(&digests[b], tolerance))).collect();
-    scored.sort_by(|a, b| b.2.total_cmp(&a.2).then((a.0, a.1).cmp(&(b.0, b.1))));
-    scored
+    let mut sorted = looked_at(surfaces, scored);
+    sorted.sort_by(|a, b| b.2.total_cmp(&a.2).then((a.0, a.1).cmp(&(b.0, b.1))));
+    sorted
+}
+
+/// The likeness of pairs after a look at how the scans lie on each other: of the best few of each scan; others keep a tenth of theirs.
+fn looked_at(surfaces: &[ScanSurface], mut pairs: Vec<(usize, usize, Likeness)>) -> Vec<(usize, usize, f64)> {
+    pairs.sort_by(|a, b| b.2.value.total_cmp(&a.2.value).then((a.0, a.1).cmp(&(b.0, b.1))));
+    let mut count = vec![0; surfaces.len()];
+    let look: Vec<bool> = pairs
+        .iter()
+        .map(|&(a, b, _)| {
+            let few = count[a] < LOOKED_AT || count[b] < LOOKED_AT;
+            count[a] += usize::from(few);
+            count[b] += usize::from(few);
+            few
+        })
+        .collect();
+    pairs
+        .into_par_iter()
+        .zip(look)
+        .map(|((a, b, alike), look)| match alike.other_from_this.filter(|_| look) {
+            Some(pose) => (a, b, alike.value * verified(&surfaces[a], &surfaces[b], &pose)),
+            None => (a, b, 0.1 * alike.value),
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -242,7 +296,8 @@ mod tests {
                 PointCloud::new(cloud.points().iter().map(|p| exp(&twist).apply(p)).collect()).unwrap()
             })
             .collect();
-        let surfaces: Vec<ScanSurface> = clouds.iter().map(|c| ScanSurface::new(c, 2000).unwrap()).collect();
+        let surfaces: Vec<ScanSurface> =
+            clouds.iter().map(|c| ScanSurface::new(c, 2000, None).unwrap()).collect();
         let digests = digests(&surfaces).unwrap();
         let pairs = likely_pairs(&surfaces, &digests);
         assert_eq!(pairs.len(), 66);

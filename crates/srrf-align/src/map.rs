@@ -83,6 +83,8 @@ pub struct MapEdge {
     pub verdict: EdgeVerdict,
     /// Share of the source's points that lie on the target, and of the target's on the source.
     pub overlap: [f64; 2],
+    /// Share of one scan's points that the other's scanner saw through; none where no place of a scanner is known.
+    pub seen_through: Option<f64>,
     /// Angle in degrees between the registration and the map; none between components.
     pub off_deg: Option<f64>,
     /// How far that moves the points of the source, root mean square; unit of the input.

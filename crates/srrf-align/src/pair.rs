@@ -14,6 +14,11 @@ pub trait Scans: Sync {
     /// How many there are.
     fn count(&self) -> usize;
 
+    /// Where the scanner of one stood, in the frame of its points; none where that is not known.
+    fn viewpoint(&self, _number: usize) -> Option<[f64; 3]> {
+        None
+    }
+
     /// One of them.
     ///
     /// # Errors

@@ -99,6 +99,7 @@ fn map_edge(number: usize, pair: &TriedPair, all: &Finished<'_>, group: &[usize]
         posterior: all.consensus.posterior[number],
         verdict: all.consensus.verdicts[number],
         overlap: pair.overlay.as_ref().map_or([0.0; 2], |o| [o.overlap_source, o.overlap_target]),
+        seen_through: pair.overlay.as_ref().and_then(|o| o.seen_through),
         off_deg: off.map(|m| m.angle_to_deg(&Rigid::identity())),
         off: off.map(|m| {
             let about_source =

@@ -9,7 +9,7 @@ use crate::consensus::{Consensus, EdgeVerdict, agree, group_of};
 use crate::likeness::{digests, likely_pairs};
 use crate::options::{AlignError, AlignOptions, AlignProgress, AlignStage, PairReason};
 use crate::pair::{RegisterPairs, Scans};
-use crate::pool::{Candidate, PairPool, Workplace};
+use crate::pool::{Candidate, PairPool, TriedPair, Workplace};
 use crate::se3::shift;
 use crate::surface::ScanSurface;
 use crate::trees::Union;
@@ -21,13 +21,15 @@ const LOOP_OVERLAP: f64 = 0.25;
 /// Points of a scan that say whether two scans overlap.
 const OVERLAP_ASKED: usize = 150;
 /// Pairs of each scan in the first round, besides those of the spanning tree.
-const FIRST: usize = 2;
-const MOST_JOIN_ROUNDS: usize = 4;
+const FIRST: usize = 3;
+const MOST_JOIN_ROUNDS: usize = 8;
 const LOOP_ROUNDS: usize = 2;
 /// Pairs that close loops, a scan and round.
 const LOOPS_PER_SCAN: usize = 2;
 /// Pairs less alike than this share of the median of those that hold are not tried to join components.
-const LIKENESS_FLOOR: f64 = 0.35;
+const LIKENESS_FLOOR: f64 = 0.03;
+/// Scanners see through less than this of what is there: edges of things are thick.
+const SEEN_THROUGH: f64 = 0.002;
 /// Neighbours in the map of which overlap is computed.
 const NEIGHBOURS: usize = 40;
 
@@ -251,9 +253,28 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
 /// What the pairs so far agree on.
 pub fn consensus_of(scans: usize, pool: &PairPool) -> Consensus {
     let edges: Vec<_> = pool.tried.iter().map(|t| t.edge.clone()).collect();
-    let prior: Vec<f64> = pool.tried.iter().map(|t| t.prior).collect();
+    let prior = by_sight(pool);
     let abstains: Vec<bool> = pool.tried.iter().map(|t| t.answer.abstain).collect();
     agree(scans, &edges, &prior, &abstains)
+}
+
+/// The prior of each pair, less where scanners saw through what should be there: odds fall by the sixth power of the share over what right
+/// pairs have, twice the lowest tenth: of rooms that look alike most pairs may be wrong. Right pairs of real scans have up to 0.15 (things move, edges are thick).
+fn by_sight(pool: &PairPool) -> Vec<f64> {
+    let share = |t: &TriedPair| t.overlay.as_ref().and_then(|o| o.seen_through);
+    let mut all: Vec<f64> = pool.tried.iter().filter(|t| t.prior >= 0.5).filter_map(share).collect();
+    all.sort_by(f64::total_cmp);
+    let usual = all.get(all.len() / 10).map_or(SEEN_THROUGH, |tenth| (2.0 * tenth).max(SEEN_THROUGH));
+    pool.tried
+        .iter()
+        .map(|t| match share(t) {
+            Some(s) if s > usual => {
+                let odds = t.prior / (1.0 - t.prior).max(1e-9) * (usual / s).powi(6);
+                odds / (1.0 + odds)
+            }
+            _ => t.prior,
+        })
+        .collect()
 }
 
 /// The pairs of `members` that overlap by at least `least` in these poses of the centred scans: `(a, b, share)`, `a < b`.

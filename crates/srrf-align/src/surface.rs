@@ -6,6 +6,7 @@ use srrf_cloud::{
 };
 
 use crate::se3::shift;
+use crate::sight::SightMap;
 
 /// Neighbours of a normal.
 const NORMAL_NEIGHBOURS: usize = 12;
@@ -15,6 +16,8 @@ const NEAR_SPACINGS: f64 = 1.5;
 const SAME_NORMAL: f64 = 0.7;
 /// Neighbouring residuals are alike: so many matches count as one.
 pub const ALIKE_MATCHES: f64 = 20.0;
+/// What a scanner saw through lies so many spacings in front of what it saw.
+const SIGHT_SPACINGS: f64 = 3.0;
 /// Points of a scan that are asked for its matches.
 const ASKED: usize = 1500;
 /// A right registration is within this share of the radius and this many spacings of the truth, three standard deviations.
@@ -36,6 +39,8 @@ pub struct ScanSurface {
     normals: Vec<Vector3<f64>>,
     /// The same among the thinned points.
     thin_spacing: f64,
+    /// How far its scanner saw, where its place is known.
+    sight: Option<SightMap>,
 }
 
 /// A point of one scan that lies on the surface of another.
@@ -58,6 +63,8 @@ pub struct Overlay {
     pub overlap_source: f64,
     /// Share of the target's points that lie on the source.
     pub overlap_target: f64,
+    /// The share of one scan's points that the other's scanner saw through, the larger of both; none where no place of a scanner is known.
+    pub seen_through: Option<f64>,
     /// Root mean square distance of those, along the normals.
     pub rms: f64,
     /// Inverse covariance of a motion after the pose, in the target's frame about its centre; rotation first.
@@ -65,11 +72,11 @@ pub struct Overlay {
 }
 
 impl ScanSurface {
-    /// Thins `cloud` to at most `most` points.
+    /// Thins `cloud` to at most `most` points. `eye` is where its scanner stood, if that is known.
     ///
     /// # Errors
     /// [`CloudError`] for fewer than three points.
-    pub fn new(cloud: &PointCloud, most: usize) -> Result<Self, CloudError> {
+    pub fn new(cloud: &PointCloud, most: usize, eye: Option<[f64; 3]>) -> Result<Self, CloudError> {
         let centre = cloud.centroid();
         let centred: Vec<[f64; 3]> =
             cloud.points().iter().map(|p| (Vector3::from(*p) - centre).into()).collect();
@@ -77,12 +84,13 @@ impl ScanSurface {
         let radius = (centred.iter().map(squared).sum::<f64>() / centred.len() as f64).sqrt();
         let reach = centred.iter().map(squared).fold(0.0, f64::max).sqrt();
         let spacing = point_spacing(&centred)?;
+        let sight = eye.map(|eye| SightMap::new(centred.iter(), Vector3::from(eye) - centre));
         let thin = thin_to(&PointCloud::new(centred)?, most, radius);
         let normals =
             estimate_normals(thin.points(), NORMAL_NEIGHBOURS)?.into_iter().map(Vector3::from).collect();
         let index = KnnIndex::new(thin.points())?;
         let thin_spacing = spacing_of(&index);
-        Ok(Self { centre, radius, reach, spacing, index, normals, thin_spacing })
+        Ok(Self { centre, radius, reach, spacing, index, normals, thin_spacing, sight })
     }
 
     /// The thinned points about the centre.
@@ -173,8 +181,24 @@ impl ScanSurface {
         Overlay {
             overlap_source: onto.len() as f64 / asked.max(1) as f64,
             overlap_target: back.len() as f64 / asked_back.max(1) as f64,
+            seen_through: self.seen_through(source, self_from_source),
             rms,
             information: self.with_floor(source, &(hessian / (ALIKE_MATCHES * sigma * sigma))),
+        }
+    }
+
+    /// The share of the points of one that the scanner of the other saw through, the larger of both.
+    pub fn seen_through(&self, source: &Self, self_from_source: &Rigid) -> Option<f64> {
+        let margin = SIGHT_SPACINGS * self.spacing.max(source.spacing);
+        let own = self
+            .sight
+            .as_ref()
+            .and_then(|s| s.seen_through(source.points().iter(), self_from_source, margin));
+        let back = self_from_source.inverse();
+        let other = source.sight.as_ref().and_then(|s| s.seen_through(self.points().iter(), &back, margin));
+        match (own, other) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (one, other) => one.or(other),
         }
     }
 
@@ -219,7 +243,7 @@ mod tests {
 
     #[test]
     fn a_scan_lies_on_itself_and_the_corner_holds_it() {
-        let surface = ScanSurface::new(&corner(40, 3), 2000).unwrap();
+        let surface = ScanSurface::new(&corner(40, 3), 2000, None).unwrap();
         let whole = surface.overlay(&surface, &Rigid::identity());
         assert!(whole.overlap_source > 0.97 && whole.overlap_target > 0.97 && whole.rms < 1e-3, "{whole:?}");
         let spread = whole.information.try_inverse().unwrap();
@@ -231,7 +255,7 @@ mod tests {
 
     #[test]
     fn a_plane_slides_and_its_information_says_so() {
-        let surface = ScanSurface::new(&corner(40, 1), 2000).unwrap();
+        let surface = ScanSurface::new(&corner(40, 1), 2000, None).unwrap();
         let spread = surface.overlay(&surface, &Rigid::identity()).information.try_inverse().unwrap();
         let deviations: Vec<f64> = (0..6).map(|i| spread[(i, i)].sqrt()).collect();
         // Turns about x and y and the shift along z are held; the others are free.
@@ -249,7 +273,7 @@ mod tests {
         let motion = exp(&Vector6::new(0.3, -0.2, 0.5, 7.0, 1.0, -2.0));
         let moved = PointCloud::new(cloud.points().iter().map(|p| motion.apply(p)).collect()).unwrap();
         let (source, target) =
-            (ScanSurface::new(&cloud, 500).unwrap(), ScanSurface::new(&moved, 500).unwrap());
+            (ScanSurface::new(&cloud, 500, None).unwrap(), ScanSurface::new(&moved, 500, None).unwrap());
         let centred = target.centred(&source, &motion);
         assert!(centred.translation.norm() < 1e-9, "means lie on each other: {centred:?}");
     }

@@ -4,7 +4,7 @@
 //!     scenes building  OUT [--row 12] [--points 20000] [--loose 3] [--noise 0.004] [--seed 1]
 //!     scenes corridor  OUT [--scans 500] [--points 20000] [--seed 1]
 //!
-//! OUT gets `scan-0000.ply` and so on, in an order that says nothing, and `truth.poses`: name, then the first three rows of
+//! OUT gets `scan-0000.ply` (a building: `.pcd`, with the place of the scanner) and so on, in an order that says nothing, and `truth.poses`: name, then the first three rows of
 //! `map_from_scan`. `corridor` repeats scans of a building until there are enough.
 
 use std::error::Error;
@@ -23,6 +23,9 @@ use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::views::{anywhere, seen_from, turntable};
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// A scan where it was taken: a name, its points, and the place of the scanner where that is told.
+type Taken = (String, PointCloud, Option<[f64; 3]>);
 
 fn main() -> Outcome<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -74,7 +77,7 @@ fn turntable_scans(
     shape: usize,
     noise: f64,
     rng: &mut ChaCha8Rng,
-) -> Outcome<Vec<(String, PointCloud)>> {
+) -> Outcome<Vec<Taken>> {
     let shapes = ProceduralShapes::new(41, 20, None)?;
     let dense = shapes.sample(shape, 60 * points, rng)?;
     let mut scans = Vec::new();
@@ -90,7 +93,7 @@ fn turntable_scans(
                 }));
             }
         }
-        scans.push((format!("view-{i:02}"), PointCloud::new(kept)?));
+        scans.push((format!("view-{i:02}"), PointCloud::new(kept)?, None));
     }
     Ok(scans)
 }
@@ -103,7 +106,7 @@ fn building_scans(
     noise: f64,
     most: Option<usize>,
     seed: u64,
-) -> Outcome<Vec<(String, PointCloud)>> {
+) -> Outcome<Vec<Taken>> {
     let building = Building::new(row, loose, seed);
     let stations = building.stations();
     let rows = ((points as f64 / 2.0).sqrt()).round() as usize;
@@ -117,23 +120,27 @@ fn building_scans(
                 station.eye[2] + 0.05 * aside,
             ];
             let scan = building.scan(eye, [2 * rows, rows], noise, seed.wrapping_mul(1000) + i as u64)?;
-            Ok((format!("{}-{}", station.name, i / stations.len()), scan))
+            Ok((format!("{}-{}", station.name, i / stations.len()), scan, Some(eye)))
         })
         .collect()
 }
 
 /// Writes the scans, each moved to anywhere, and the truth.
-fn write(out: &Path, scans: &[(String, PointCloud)], rng: &mut ChaCha8Rng) -> Outcome<()> {
+fn write(out: &Path, scans: &[Taken], rng: &mut ChaCha8Rng) -> Outcome<()> {
     fs::create_dir_all(out)?;
     let mut truth = fs::File::create(out.join("truth.poses"))?;
     writeln!(truth, "# file, station, first three rows of map_from_scan")?;
-    for (number, (station, scan)) in scans.iter().enumerate() {
+    for (number, (station, scan, eye)) in scans.iter().enumerate() {
         let size = scan.points().iter().flatten().fold(0.0f64, |most, c| most.max(c.abs()));
         let angles = std::array::from_fn(|_| rng.random_range(-3.0..3.0));
         let scan_from_map: Rigid = anywhere(angles, std::array::from_fn(|_| rng.random_range(-size..size)));
-        let name = format!("scan-{number:04}.ply");
+        let name = format!("scan-{number:04}.{}", if eye.is_some() { "pcd" } else { "ply" });
         let moved = scan.points().iter().map(|p| scan_from_map.apply(p)).collect();
-        write_cloud(&out.join(&name), &PointCloud::new(moved)?)?;
+        let moved = PointCloud::new(moved)?;
+        match eye {
+            Some(eye) => fs::write(out.join(&name), pcd(&moved, scan_from_map.apply(eye)))?,
+            None => write_cloud(&out.join(&name), &moved)?,
+        }
         let map_from_scan = scan_from_map.inverse().to_matrix4();
         let numbers: Vec<String> = (0..3)
             .flat_map(|r| (0..4).map(move |c| (r, c)))
@@ -142,4 +149,17 @@ fn write(out: &Path, scans: &[(String, PointCloud)], rng: &mut ChaCha8Rng) -> Ou
         writeln!(truth, "{name} {station} {}", numbers.join(" "))?;
     }
     Ok(())
+}
+
+/// PCD, which has a place for that of the scanner.
+fn pcd(cloud: &PointCloud, eye: [f64; 3]) -> Vec<u8> {
+    let n = cloud.len();
+    let [x, y, z] = eye;
+    let mut bytes = format!(
+        "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {n}\n\
+         HEIGHT 1\nVIEWPOINT {x} {y} {z} 1 0 0 0\nPOINTS {n}\nDATA binary\n"
+    )
+    .into_bytes();
+    cloud.points().iter().flatten().for_each(|c| bytes.extend(c.to_le_bytes()));
+    bytes
 }

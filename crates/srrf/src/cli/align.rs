@@ -209,10 +209,6 @@ impl AlignArgs {
             files::write(path, align_poses::to_tum(map, scans).as_bytes())?;
             lines.push(wrote(path, "the poses of the largest map, as TUM"));
         }
-        if let Some(path) = &self.kitti {
-            files::write(path, align_poses::to_kitti(map)?.as_bytes())?;
-            lines.push(wrote(path, "the poses, as KITTI"));
-        }
         if let Some(path) = &self.merge.save {
             let (points, of) = merge(map, scans, &self.merge, path)?;
             let what = format!(
@@ -225,6 +221,11 @@ impl AlignArgs {
         if let Some(path) = &self.html {
             files::write(path, align_page::page(map, scans)?.as_bytes())?;
             lines.push(wrote(path, "open it in a browser"));
+        }
+        // Last, since several maps are refused.
+        if let Some(path) = &self.kitti {
+            files::write(path, align_poses::to_kitti(map)?.as_bytes())?;
+            lines.push(wrote(path, "the poses, as KITTI"));
         }
         Ok(lines)
     }

@@ -107,6 +107,9 @@ fn edge_facts(e: &MapEdge) -> Vec<(String, String)> {
         fact("Overlap", format!("{}, {}", percent(e.overlap[0]), percent(e.overlap[1]))),
         fact("Tried for", e.reason.to_string()),
     ];
+    if let Some(share) = e.seen_through {
+        facts.push(fact("Seen through", percent(share)));
+    }
     if let (Some(degrees), Some(off)) = (e.off_deg, e.off) {
         facts.push(fact("Off the map", format!("{degrees:.3}°, {}", length(off, 3))));
     }

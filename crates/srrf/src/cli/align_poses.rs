@@ -101,6 +101,7 @@ fn edge(number: usize, e: &MapEdge) -> Value {
         "verdict": e.verdict,
         "overlap_source": e.overlap[0],
         "overlap_target": e.overlap[1],
+        "seen_through": e.seen_through,
         "off_deg": e.off_deg,
         "off": e.off,
     })
