@@ -11,6 +11,7 @@ use srrf_align::{AlignError, AlignOptions, AlignProgress, AlignStage, Map};
 use srrf_args::flags::{Common, value};
 use srrf_args::words::{count, counted, length};
 use srrf_args::{Failure, Output, Progress, files, interrupt};
+use srrf_cloud::io::ReadOptions;
 
 use super::align_edges::EdgeFile;
 use super::align_initial::{self, EarlierMap};
@@ -188,7 +189,7 @@ impl AlignArgs {
     fn open(&self, known: Option<&EarlierMap>) -> Result<ScanFiles, Failure> {
         let before: Vec<PathBuf> = known.map_or_else(Vec::new, EarlierMap::paths);
         let budget = self.max_memory.map(|gb| gb * 1e9);
-        ScanFiles::open(&before, &self.scans, budget)
+        ScanFiles::open(&before, &self.scans, budget, &ReadOptions::default())
     }
 
     /// Writes what was asked for; says what was written.

@@ -22,6 +22,7 @@ const OTHER_UNIT: f64 = 25.0;
 /// Scans by number.
 #[derive(Debug)]
 pub struct ScanFiles {
+    options: ReadOptions,
     scans: Vec<OneScan>,
     budget: Option<f64>,
 }
@@ -34,6 +35,8 @@ struct OneScan {
     dropped: usize,
     /// Largest distance from the middle of the box.
     size: f64,
+    /// Where its scanner stood, where the file says it.
+    viewpoint: Option<[f64; 3]>,
     /// None where it is read again each time.
     cloud: Option<PointCloud>,
 }
@@ -44,7 +47,12 @@ impl ScanFiles {
     ///
     /// # Errors
     /// [`Failure::usage`] for what cannot be read or used.
-    pub fn open(before: &[PathBuf], given: &[PathBuf], budget: Option<f64>) -> Result<Self, Failure> {
+    pub fn open(
+        before: &[PathBuf],
+        given: &[PathBuf],
+        budget: Option<f64>,
+        options: &ReadOptions,
+    ) -> Result<Self, Failure> {
         let mut paths = before.to_vec();
         for path in expanded(given)? {
             if paths.contains(&path) {
@@ -60,7 +68,8 @@ impl ScanFiles {
         let mut kept = 0.0;
         // A few at a time, so that those which are not kept are not in memory all at once.
         for some in paths.chunks(rayon::current_num_threads().max(1)) {
-            let read: Vec<OneScan> = some.par_iter().map(|path| read(path)).collect::<Result<_, _>>()?;
+            let read: Vec<OneScan> =
+                some.par_iter().map(|path| read(path, options)).collect::<Result<_, _>>()?;
             for mut scan in read {
                 kept += POINT * scan.points as f64;
                 if kept > keep_bytes {
@@ -70,7 +79,7 @@ impl ScanFiles {
                 scans.push(scan);
             }
         }
-        Ok(Self { scans, budget })
+        Ok(Self { options: options.clone(), scans, budget })
     }
 
     /// How many there are.
@@ -123,11 +132,15 @@ impl Scans for ScanFiles {
         self.len()
     }
 
+    fn viewpoint(&self, number: usize) -> Option<[f64; 3]> {
+        self.scans[number].viewpoint
+    }
+
     fn cloud(&self, number: usize) -> Result<Cow<'_, PointCloud>, Failure> {
         match &self.scans[number].cloud {
             Some(cloud) => Ok(Cow::Borrowed(cloud)),
             None => {
-                let again = read(&self.scans[number].path)?;
+                let again = read(&self.scans[number].path, &self.options)?;
                 if again.hash != self.scans[number].hash {
                     return Err(Failure::usage(format!(
                         "{:?} has changed since it was read first; start again when nobody writes it",
@@ -145,13 +158,21 @@ impl Scans for ScanFiles {
     }
 }
 
-fn read(path: &Path) -> Result<OneScan, Failure> {
-    let Input { cloud, dropped, .. } = files::read_solid(path, None, ReadOptions::default())?;
+fn read(path: &Path, options: &ReadOptions) -> Result<OneScan, Failure> {
+    let Input { cloud, dropped, viewpoint, .. } = files::read_solid(path, None, options.clone())?;
     let middle = cloud.middle();
     let size =
         cloud.points().iter().map(|p| (nalgebra::Vector3::from(*p) - middle).norm()).fold(0.0, f64::max);
     let hash = hash_of(&cloud);
-    Ok(OneScan { path: path.to_owned(), hash, points: cloud.len(), dropped, size, cloud: Some(cloud) })
+    Ok(OneScan {
+        path: path.to_owned(),
+        hash,
+        points: cloud.len(),
+        dropped,
+        size,
+        viewpoint,
+        cloud: Some(cloud),
+    })
 }
 
 /// The first 16 bytes of the SHA-256 of the coordinates, in hexadecimal.
@@ -199,6 +220,10 @@ mod tests {
 
     use super::*;
 
+    fn open(given: &[PathBuf], budget: Option<f64>) -> Result<ScanFiles, Failure> {
+        ScanFiles::open(&[], given, budget, &ReadOptions::default())
+    }
+
     fn cloud(n: usize) -> PointCloud {
         PointCloud::new((0..n).map(|i| [i as f64, (i * i % 7) as f64, (i % 3) as f64]).collect()).unwrap()
     }
@@ -211,14 +236,14 @@ mod tests {
         }
         std::fs::write(folder.path().join("notes.md"), "hello").unwrap();
         let given = [folder.path().to_owned()];
-        let scans = ScanFiles::open(&[], &given, None).unwrap();
+        let scans = open(&given, None).unwrap();
         assert!(scans.name(0).ends_with("a.xyz") && scans.name(1).ends_with("b.ply"));
         assert_eq!((scans.len(), scans.points(1), scans.hash(0)), (2, (9, 0), scans.hash(1)));
         let twice = [folder.path().to_owned(), folder.path().join("b.ply")];
-        let error = ScanFiles::open(&[], &twice, None).unwrap_err().to_string();
+        let error = open(&twice, None).unwrap_err().to_string();
         assert!(error.contains("b.ply") && error.contains("twice"), "{error}");
         let empty = tempfile::tempdir().unwrap();
-        let error = ScanFiles::open(&[], &[empty.path().to_owned()], None).unwrap_err().to_string();
+        let error = open(&[empty.path().to_owned()], None).unwrap_err().to_string();
         assert!(error.contains("holds no file"), "{error}");
     }
 
@@ -231,8 +256,8 @@ mod tests {
             write_cloud(&path, &PointCloud::new(points).unwrap()).unwrap();
             path
         });
-        assert_eq!(ScanFiles::open(&[], &paths[..2], None).unwrap().far_apart(), None);
-        let (small, large, factor) = ScanFiles::open(&[], &paths, None).unwrap().far_apart().unwrap();
+        assert_eq!(open(&paths[..2], None).unwrap().far_apart(), None);
+        let (small, large, factor) = open(&paths, None).unwrap().far_apart().unwrap();
         assert!(small.ends_with("1.ply") && large.ends_with("40.ply") && (factor - 40.0).abs() < 1e-9);
     }
 
@@ -241,7 +266,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.ply");
         write_cloud(&path, &cloud(9)).unwrap();
-        let scans = ScanFiles::open(&[], std::slice::from_ref(&path), Some(100.0)).unwrap();
+        let scans = open(std::slice::from_ref(&path), Some(100.0)).unwrap();
         assert!(scans.scans[0].cloud.is_none() && scans.at_once(8) == 1);
         assert_eq!(scans.cloud(0).unwrap().len(), 9);
         write_cloud(&path, &cloud(10)).unwrap();
