@@ -5,7 +5,8 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use srrf_cloud::io::{
-    CloudFile, Contents, IoError, Kept, Note, ReadOptions, write_atomically, write_cloud, write_cloud_to,
+    CloudFile, Contents, IoError, Kept, Note, Outgoing, ReadOptions, write_atomically, write_outgoing,
+    write_outgoing_to,
 };
 use srrf_cloud::{CloudError, PointCloud, Rigid, Solid};
 
@@ -130,16 +131,19 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     })
 }
 
-/// Writes a cloud; to a stream as PLY.
+/// Writes a cloud; to a stream as PLY. Coordinates are in single precision where `original` holds them so and that is
+/// enough.
 ///
 /// # Errors
 /// [`Failure`], which names the file.
-pub fn write_points(path: &Path, cloud: &PointCloud) -> Result<(), Failure> {
+pub fn write_points(path: &Path, cloud: &PointCloud, original: &Input) -> Result<Kept, Failure> {
     let _guard = interrupt::hold();
+    let (single, before) = (original.single, original.cloud.points());
+    let cloud = Outgoing { single, before, ..Outgoing::of_points(cloud.points()) };
     Ok(match () {
-        () if is_stream(path) => write_cloud_to(&mut io::stdout().lock(), "ply", cloud),
-        () if is_special(path) => write_cloud_to(&mut open(path)?, "ply", cloud),
-        () => write_cloud(path, cloud),
+        () if is_stream(path) => write_outgoing_to(&mut io::stdout().lock(), "ply", &cloud),
+        () if is_special(path) => write_outgoing_to(&mut open(path)?, "ply", &cloud),
+        () => write_outgoing(path, &cloud),
     }?)
 }
 
@@ -189,9 +193,12 @@ mod tests {
         let null = Path::new("/dev/null");
         write(null, b"x").unwrap();
         assert!(is_special(null));
-        let cloud = PointCloud::new(vec![[1.0; 3]]).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let cloud = folder.path().join("a.xyz");
+        std::fs::write(&cloud, "1 1 1\n").unwrap();
+        let input = read(&cloud, None, ReadOptions::default()).unwrap();
         check_output(null).unwrap();
-        write_points(null, &cloud).unwrap();
+        write_points(null, &input.cloud, &input).unwrap();
         assert!(is_special(null));
     }
 }

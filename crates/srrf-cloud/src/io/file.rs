@@ -4,21 +4,13 @@ use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use super::write_atomically;
+use super::outgoing::{NORMALS, fitted};
 use super::{Attribute, CloudFormat, Contents, FORMATS, FormatError, IoError, ReadOptions, ScanEntry};
+use super::{Kept, Outgoing, write_atomically};
 use crate::{CloudError, PointCloud, Rigid};
 
 /// Formats that need a cargo feature of the same name, and the extensions of their files.
 const OPTIONAL: &[(&str, &[&str])] = &[("las", &["las", "laz"]), ("e57", &["e57"])];
-
-/// What a moved copy keeps of its original.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kept {
-    /// All that the file holds besides the points.
-    Everything,
-    /// Only the points, because the copy is of another format.
-    Points,
-}
 
 /// The names of all formats of this build, for help texts.
 pub fn format_names() -> Vec<&'static str> {
@@ -187,16 +179,16 @@ impl CloudFile {
     }
 
     /// Writes `output` with the points moved by `motion` and the normals turned: with all else
-    /// unchanged if its extension says the same format, otherwise only the points. The file appears
-    /// whole or not at all.
+    /// unchanged if its extension says the same format, otherwise with the attributes that the other
+    /// format has room for. The file appears whole or not at all.
     ///
     /// # Errors
     /// [`IoError`], which names the file.
     pub fn write_transformed(&self, output: &Path, motion: &Rigid) -> Result<Kept, IoError> {
         let format = format_of(output)?;
-        let mut kept = Kept::Points;
+        let mut kept = Kept::default();
         let written = write_atomically(output, |out| {
-            kept = self.put_transformed(format, motion, out)?;
+            kept = self.put_transformed(format, &extension_of(output), motion, out)?;
             Ok(())
         });
         written.map(|()| kept).map_err(|source| self.write_error(output, source))
@@ -213,25 +205,59 @@ impl CloudFile {
         format: Option<&str>,
         motion: &Rigid,
     ) -> Result<Kept, IoError> {
+        let extension = format.unwrap_or_default().to_ascii_lowercase();
         let format = format.map_or(Ok(self.format), named)?;
-        let written = self.put_transformed(format, motion, out).and_then(|kept| out.flush().map(|()| kept));
+        let written =
+            self.put_transformed(format, &extension, motion, out).and_then(|kept| out.flush().map(|()| kept));
         written.map_err(|source| self.write_error(Path::new("-"), source))
     }
 
     fn put_transformed(
         &self,
         format: &'static dyn CloudFormat,
+        extension: &str,
         motion: &Rigid,
         out: &mut dyn Write,
     ) -> io::Result<Kept> {
-        if format.name() == self.format.name() {
-            format.rewrite(&self.bytes, &self.options, motion, out)?;
-            return Ok(Kept::Everything);
+        if format.name() == self.format.name() && format.conforms(&self.bytes, extension) {
+            return self.rewrite(extension, motion, out);
         }
-        let mut points = self.read()?.points;
-        points.iter_mut().for_each(|point| *point = super::scan::moved(motion, *point));
-        format.write(&points, out)?;
-        Ok(Kept::Points)
+        if let Some(copy) = format.rewrite_from(self.format.name(), &self.bytes, &self.options, motion) {
+            out.write_all(&copy?)?;
+            return Ok(Kept::default());
+        }
+        let contents = self.read()?;
+        let mut attributes = self.format.attributes(&self.bytes, &self.options)?;
+        turn_normals(&mut attributes, motion);
+        let points: Vec<[f64; 3]> =
+            contents.points.iter().map(|&point| super::scan::moved(motion, point)).collect();
+        // A text has no type; single precision is enough for it where that has the same decimals.
+        let of_text = |points: &[[f64; 3]]| points.iter().flatten().all(|&c| super::text::fits_single(c));
+        let single = contents.single
+            || (self.format.name() == "xyz" && format.has_both_precisions() && of_text(&contents.points));
+        let before = &contents.points;
+        let cloud = Outgoing { points: &points, single, before, attributes: &attributes, extension };
+        let (cloud, mut kept) = fitted(format, &cloud);
+        format.write_cloud(&cloud, out)?;
+        kept.lost.extend(self.format.left_out(&self.bytes, &self.options)?);
+        if !contents.faces.is_empty() {
+            kept.lost.push("faces".into());
+        }
+        Ok(kept)
+    }
+
+    /// A copy in the format of the file.
+    fn rewrite(&self, extension: &str, motion: &Rigid, out: &mut dyn Write) -> io::Result<Kept> {
+        self.format.rewrite(&self.bytes, &self.options, motion, out)?;
+        if !self.format.has_both_precisions() || *motion == Rigid::identity() {
+            return Ok(Kept::default());
+        }
+        let contents = self.read()?;
+        let points: Vec<[f64; 3]> =
+            contents.points.iter().map(|&point| super::scan::moved(motion, point)).collect();
+        let before = &contents.points;
+        let cloud = Outgoing { single: contents.single, before, extension, ..Outgoing::of_points(&points) };
+        Ok(fitted(self.format, &cloud).1)
     }
 
     fn checked(&self, points: Vec<[f64; 3]>) -> Result<PointCloud, IoError> {
@@ -305,9 +331,31 @@ fn read_within(
     Ok(bytes)
 }
 
+/// Turns the attributes that are normals.
+fn turn_normals(attributes: &mut [Attribute], motion: &Rigid) {
+    let place = |name: &str| attributes.iter().position(|attribute| attribute.name == name);
+    let [Some(x), Some(y), Some(z)] = NORMALS.map(place) else { return };
+    let count = attributes[x].values.len();
+    let mut turned: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(count));
+    for point in 0..count {
+        let normal = [x, y, z].map(|axis| attributes[axis].values.get(point).unwrap_or(f64::NAN));
+        let new = super::scan::turned(motion, normal);
+        turned.iter_mut().zip(new).for_each(|(list, value)| list.push(value));
+    }
+    for (axis, values) in [x, y, z].into_iter().zip(turned) {
+        let kind = attributes[axis].values.scalar().for_turned();
+        attributes[axis].values = kind.of_numbers(&values);
+    }
+}
+
+/// The extension of a file, in small letters.
+pub(super) fn extension_of(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}
+
 /// The format that the extension of `path` says.
 pub(super) fn format_of(path: &Path) -> Result<&'static dyn CloudFormat, IoError> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let extension = extension_of(path);
     let unknown =
         if extension.is_empty() { "there is no extension" } else { "the extension says no known format" };
     find(path, &extension, unknown)

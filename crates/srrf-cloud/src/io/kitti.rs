@@ -2,9 +2,11 @@
 
 use std::io::{self, Write};
 
+use super::outgoing::INTENSITY;
+use super::scalar::Scalar;
 use super::scan::{Splice, moved};
 use super::single::check_single;
-use super::{CloudFormat, Contents, FormatError, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// Bytes of a point.
@@ -45,12 +47,27 @@ impl CloudFormat for Kitti {
         Ok(Contents { points, single: true, ..Contents::default() })
     }
 
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        let count = self.read(bytes, options)?.points.len();
+        let places = (0..count).map(|point| point * RECORD + 12);
+        Ok(vec![Attribute { name: INTENSITY.into(), values: Scalar::F32.column(bytes, false, places) }])
+    }
+
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        check_single(points, "KITTI .bin")?;
-        let intensity = [0; 4];
-        points.iter().try_for_each(|point| {
+        self.write_cloud(&Outgoing::of_points(points), out)
+    }
+
+    fn keeps(&self, attribute: &Attribute, _: &Outgoing<'_>) -> bool {
+        attribute.name == INTENSITY
+    }
+
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        check_single(cloud.points, "KITTI .bin")?;
+        let intensity = cloud.attribute(INTENSITY);
+        cloud.points.iter().enumerate().try_for_each(|(index, point)| {
             point.iter().try_for_each(|&c| out.write_all(&(c as f32).to_le_bytes()))?;
-            out.write_all(&intensity)
+            let intensity = intensity.and_then(|i| i.values.get(index)).unwrap_or(0.0);
+            out.write_all(&(intensity as f32).to_le_bytes())
         })
     }
 

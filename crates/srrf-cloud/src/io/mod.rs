@@ -17,6 +17,7 @@ use crate::{PointCloud, Rigid};
 
 mod arrays;
 mod atomic;
+mod columns;
 mod contents;
 #[cfg(feature = "e57")]
 mod e57;
@@ -32,6 +33,7 @@ mod npz_writer;
 mod obj;
 pub mod off;
 mod options;
+mod outgoing;
 mod pcd;
 mod ply;
 mod scalar;
@@ -44,10 +46,11 @@ pub use arrays::{ArrayError, NpzArrays, read_npy, read_npz};
 pub use atomic::{place_of, remove_left_overs, write_atomically};
 pub use contents::{Attribute, AttributeValues, Contents, Note, ScanEntry};
 pub use error::{FormatError, IoError};
-pub use file::{CloudFile, Kept, format_names};
+pub use file::{CloudFile, format_names};
 pub use npy::Array;
 pub use npz_writer::NpzWriter;
 pub use options::{ColumnName, OptionError, PointColumns, PointLayout, ReadOptions};
+pub use outgoing::{Kept, Outgoing, WhyDouble};
 pub use text::parse_point;
 
 /// A file format for clouds.
@@ -97,6 +100,54 @@ pub trait CloudFormat: Sync {
     /// # Errors
     /// Those of `out`; [`FormatError::Unwritable`] inside where the format cannot hold the points.
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> std::io::Result<()>;
+
+    /// Names of what the points have besides, and what is no [attribute](Self::attributes), such as words and lists.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    fn left_out(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<String>, FormatError> {
+        let _ = (bytes, options);
+        Ok(Vec::new())
+    }
+
+    /// As [`rewrite`](Self::rewrite), of a file of another format whose records this one holds as they are; `None` for
+    /// any other.
+    fn rewrite_from(
+        &self,
+        format: &str,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+    ) -> Option<std::io::Result<Vec<u8>>> {
+        let _ = (format, bytes, options, motion);
+        None
+    }
+
+    /// Whether a file of this content is what the readers of files with this extension expect; one that is not is
+    /// written anew and not copied.
+    fn conforms(&self, bytes: &[u8], extension: &str) -> bool {
+        let _ = (bytes, extension);
+        true
+    }
+
+    /// Whether [`write_cloud`](Self::write_cloud) keeps an attribute of this cloud.
+    fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
+        let _ = (attribute, cloud);
+        false
+    }
+
+    /// Whether coordinates may be in single or in double precision.
+    fn has_both_precisions(&self) -> bool {
+        false
+    }
+
+    /// Writes a cloud in the precision that it asks for, with the attributes that the format [keeps](Self::keeps).
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> std::io::Result<()> {
+        self.write(cloud.points, out)
+    }
 
     /// Writes the file in `bytes` anew with its points moved by `motion` and its normals turned,
     /// and all else as it is; `options` say which numbers are the points, as for [`read`](Self::read). Points with NaN
@@ -157,9 +208,22 @@ pub fn read_cloud_dropping_nan(path: &Path) -> Result<(PointCloud, usize), IoErr
 /// # Errors
 /// [`IoError::UnknownFormat`], [`IoError::LeftOut`], [`IoError::Write`].
 pub fn write_cloud(path: &Path, cloud: &PointCloud) -> Result<(), IoError> {
+    write_outgoing(path, &Outgoing::of_points(cloud.points())).map(drop)
+}
+
+/// Writes a cloud with its attributes in the format that the extension of `path` says, and says what of it that format
+/// has no room for. Where single precision is asked for and would move points by more than a millionth of the cloud's
+/// size, it is double, and said. The file appears whole or not at all.
+///
+/// # Errors
+/// As [`write_cloud`].
+pub fn write_outgoing(path: &Path, cloud: &Outgoing<'_>) -> Result<Kept, IoError> {
     let format = file::format_of(path)?;
-    write_atomically(path, |out| format.write(cloud.points(), out))
-        .map_err(|source| IoError::Write { path: path.to_owned(), source })
+    let extension = file::extension_of(path);
+    let (cloud, kept) = outgoing::fitted(format, &Outgoing { extension: &extension, ..*cloud });
+    write_atomically(path, |out| format.write_cloud(&cloud, out))
+        .map_err(|source| IoError::Write { path: path.to_owned(), source })?;
+    Ok(kept)
 }
 
 /// Writes a cloud to a stream in the format of this name or extension (such as `ply`).
@@ -167,14 +231,24 @@ pub fn write_cloud(path: &Path, cloud: &PointCloud) -> Result<(), IoError> {
 /// # Errors
 /// As [`write_cloud`]; the stream is called `-`.
 pub fn write_cloud_to(out: &mut dyn Write, format: &str, cloud: &PointCloud) -> Result<(), IoError> {
+    write_outgoing_to(out, format, &Outgoing::of_points(cloud.points())).map(drop)
+}
+
+/// As [`write_outgoing`], to a stream in the format of this name or extension.
+///
+/// # Errors
+/// As [`write_cloud`]; the stream is called `-`.
+pub fn write_outgoing_to(out: &mut dyn Write, format: &str, cloud: &Outgoing<'_>) -> Result<Kept, IoError> {
+    let extension = format.to_ascii_lowercase();
     let format = file::named(format)?;
-    let written = format.write(cloud.points(), out).and_then(|()| out.flush());
-    written.map_err(|source| IoError::Write { path: "-".into(), source })
+    let (cloud, kept) = outgoing::fitted(format, &Outgoing { extension: &extension, ..*cloud });
+    let written = format.write_cloud(&cloud, out).and_then(|()| out.flush());
+    written.map(|()| kept).map_err(|source| IoError::Write { path: "-".into(), source })
 }
 
 /// Reads the file `input`, moves its points by `motion`, turns its normals and writes `output`: with
-/// all else unchanged if both are of one format ([`CloudFormat::rewrite`]), otherwise only the
-/// points. The file appears whole or not at all; it may replace `input`.
+/// all else unchanged if both are of one format ([`CloudFormat::rewrite`]), otherwise with the attributes
+/// that the other format has room for. The file appears whole or not at all; it may replace `input`.
 ///
 /// # Errors
 /// [`IoError`], which names the file.

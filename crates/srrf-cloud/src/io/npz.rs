@@ -6,8 +6,9 @@ use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-use super::npy::{Npy, cloud_bytes};
-use super::{CloudFormat, Contents, FormatError, ReadOptions};
+use super::npy::{Npy, array_of, cloud_bytes, columns, known};
+use super::outgoing::{COLOURS, INTENSITY, NORMALS};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// Names of the array that is the cloud, the first of them that is there.
@@ -19,7 +20,7 @@ const SLACK: u64 = 1 << 20;
 
 /// NPZ archives, compressed or not. The cloud is the array named `points`, `xyz`, `cloud`, `pcd`,
 /// `coords`, `pos`, `vertices` or `arr_0`, or else the only one whose shape is `[n, 3]` or wider.
-/// Written with one array, `points`. A moved copy keeps all other arrays as they are.
+/// Written with the array `points`, and `colors`, `normals` and one more for each other attribute. A moved copy keeps all other arrays as they are.
 pub(super) struct Npz;
 
 impl CloudFormat for Npz {
@@ -41,11 +42,58 @@ impl CloudFormat for Npz {
         Npy.read(&unpack_at(&mut archive, cloud, bytes.len())?, options)
     }
 
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        let points = self.read(bytes, options)?.points.len();
+        let mut archive = open(bytes)?;
+        let cloud = choose(&mut archive)?;
+        let mut attributes = Npy.attributes(&unpack_at(&mut archive, cloud, bytes.len())?, options)?;
+        for index in (0..archive.len()).filter(|&index| index != cloud) {
+            let name =
+                archive.by_index(index).ok().and_then(|entry| entry.name().ok().map(|n| n.into_owned()));
+            let Some(name) = name.as_deref().and_then(|name| name.strip_suffix(".npy")) else { continue };
+            // An array of another kind is none of the points'.
+            let Ok(array) = unpack_at(&mut archive, index, bytes.len()) else { continue };
+            options.check_memory("the attributes", bytes.len(), array.len())?;
+            let columns = columns(&array, points).unwrap_or_default();
+            let names = column_names(name, columns.len());
+            attributes.extend(names.zip(columns).map(|(name, values)| Attribute { name, values }));
+        }
+        Ok(attributes)
+    }
+
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
+        self.write_cloud(&Outgoing::of_points(points), out)
+    }
+
+    fn keeps(&self, _: &Attribute, _: &Outgoing<'_>) -> bool {
+        true
+    }
+
+    fn has_both_precisions(&self) -> bool {
+        true
+    }
+
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
         let mut array = Vec::new();
-        Npy.write(points, &mut array)?;
+        Npy.write_cloud(cloud, &mut array)?;
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         put(&mut archive, "points.npy", CompressionMethod::Stored, &array)?;
+        let mut together: Vec<&str> = Vec::new();
+        for (name, parts) in [("colors", COLOURS), ("normals", NORMALS)] {
+            let Some(three) = cloud.triple(parts) else { continue };
+            let kind = three[0].values.scalar();
+            if three.iter().all(|part| part.values.scalar() == kind) {
+                let array = array_of(&three.map(|part| &part.values));
+                put(&mut archive, &format!("{name}.npy"), CompressionMethod::Stored, &array)?;
+                together.extend(parts);
+            }
+        }
+        for attribute in cloud.attributes.iter().filter(|a| !together.contains(&a.name.as_str())) {
+            let name: String =
+                attribute.name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+            let array = array_of(&[&attribute.values]);
+            put(&mut archive, &format!("{name}.npy"), CompressionMethod::Stored, &array)?;
+        }
         out.write_all(archive.finish()?.get_ref())
     }
 
@@ -73,6 +121,23 @@ impl CloudFormat for Npz {
         }
         out.write_all(written.finish()?.get_ref())
     }
+}
+
+/// The names of the columns of an array of this name.
+fn column_names(array: &str, columns: usize) -> impl Iterator<Item = String> {
+    let array = array.to_ascii_lowercase();
+    let parts: &[&str] = match (&*array, columns) {
+        ("colors" | "colours" | "color" | "colour" | "rgb", 3) => &COLOURS,
+        ("colors" | "colours" | "color" | "colour" | "rgba", 4) => &["red", "green", "blue", "alpha"],
+        ("normals" | "normal", 3) => &NORMALS,
+        ("intensities", 1) => &[INTENSITY],
+        _ => &[],
+    };
+    (0..columns).map(move |column| match parts.get(column) {
+        Some(part) => (*part).to_owned(),
+        None if columns == 1 => known(&array),
+        None => format!("{array}_{column}"),
+    })
 }
 
 type Archive<'a> = ZipArchive<Cursor<&'a [u8]>>;

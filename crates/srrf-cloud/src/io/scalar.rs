@@ -84,11 +84,15 @@ impl Scalar {
     }
 
     /// The type for coordinate `axis` of a moved copy: this one if it holds all that has changed
-    /// from `old` to `new`, otherwise `F64`.
-    pub fn for_moved(self, axis: usize, old: &[[f64; 3]], new: &[[f64; 3]]) -> Self {
+    /// from `old` to `new`, otherwise `F32` where that is enough, or `F64`.
+    pub fn for_moved(self, axis: usize, old: &[[f64; 3]], new: &[[f64; 3]], single: bool) -> Self {
         let pairs = || old.iter().zip(new).map(|(old, new)| (old[axis], new[axis]));
         let holds = |(old, new): (f64, f64)| old == new || old.is_nan() || self.holds(new);
-        if pairs().all(holds) { self } else { Self::F64 }
+        match pairs().all(holds) {
+            true => self,
+            false if single => Self::F32,
+            false => Self::F64,
+        }
     }
 
     /// The type for the components of a turned normal: floating point.
@@ -139,7 +143,8 @@ mod tests {
         assert!(Scalar::F32.holds(0.5) && !Scalar::F32.holds(0.1) && Scalar::F32.holds(f64::NAN));
         assert!(Scalar::U8.holds(255.0) && !Scalar::U8.holds(256.0) && !Scalar::I32.holds(0.5));
         let (old, new) = ([[0.1, 1.0, 2.0], [1.0, 2.0, f64::NAN]], [[0.1, 0.1, 2.0], [2.5, 2.0, f64::NAN]]);
-        let types = [0, 1, 2].map(|axis| Scalar::F32.for_moved(axis, &old, &new));
-        assert_eq!(types, [Scalar::F32, Scalar::F64, Scalar::F32]);
+        let types = |single| [0, 1, 2].map(|axis| Scalar::F32.for_moved(axis, &old, &new, single));
+        assert_eq!(types(false), [Scalar::F32, Scalar::F64, Scalar::F32]);
+        assert_eq!(types(true), [Scalar::F32; 3]);
     }
 }

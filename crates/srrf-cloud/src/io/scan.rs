@@ -127,6 +127,19 @@ pub(super) fn put_number(out: &mut Vec<u8>, value: f64) {
     };
 }
 
+/// As [`put_number`], in the fewest digits that read back as the same bits in single precision.
+pub(super) fn put_single(out: &mut Vec<u8>, value: f32) {
+    let size = value.abs();
+    // A vector takes all that is written.
+    let _ = if value.is_nan() {
+        out.write_all(b"nan")
+    } else if size == 0.0 || (1e-5..1e9).contains(&size) || size.is_infinite() {
+        write!(out, "{value}")
+    } else {
+        write!(out, "{value:e}")
+    };
+}
+
 /// Writes `points`, each as `head` and three numbers on a line of its own.
 pub(super) fn write_rows(points: &[[f64; 3]], head: &str, out: &mut dyn Write) -> io::Result<()> {
     let mut row = Vec::with_capacity(96);
@@ -244,6 +257,17 @@ mod tests {
             put_number(&mut text, value);
             assert!(text.len() < 26);
             assert_eq!(number(&text).unwrap().to_bits(), value.to_bits());
+        }
+    }
+
+    #[test]
+    fn single_precision_has_few_digits() {
+        for (value, text) in
+            [(0.1f32, "0.1"), (-3e-7, "-3e-7"), (16_777_216.0, "16777216"), (f32::NAN, "nan")]
+        {
+            let mut out = Vec::new();
+            put_single(&mut out, value);
+            assert_eq!(out, text.as_bytes());
         }
     }
 

@@ -4,7 +4,7 @@ use super::FormatError;
 
 /// The share of the cloud's size by which rounding may move a point: a hundredth of a millimetre
 /// on ten metres.
-const TOLERANCE: f64 = 1e-6;
+pub(super) const TOLERANCE: f64 = 1e-6;
 
 /// Refuses points that 32-bit floats would move by more than a millionth of the cloud's size (the
 /// diagonal of its bounding box), such as map coordinates.
@@ -12,6 +12,19 @@ const TOLERANCE: f64 = 1e-6;
 /// # Errors
 /// [`FormatError::Unwritable`], which says by how much.
 pub(super) fn check_single(points: &[[f64; 3]], format: &str) -> Result<(), FormatError> {
+    let (worst, size) = rounding(points);
+    if worst.is_finite() && worst <= TOLERANCE * size {
+        return Ok(());
+    }
+    Err(FormatError::Unwritable(format!(
+        "{format} holds single precision, which would move points by up to {worst:.1e} on a cloud of size \
+         {size:.1e}; write .ply or .pcd, which hold double precision, or subtract an offset first"
+    )))
+}
+
+/// By how much single precision moves a coordinate at most, and the diagonal of the bounding box. Points with NaN or
+/// infinity do not count.
+pub(super) fn rounding(points: &[[f64; 3]]) -> (f64, f64) {
     let finite = || points.iter().filter(|p| p.iter().all(|c| c.is_finite()));
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     let mut worst = 0.0f64;
@@ -23,13 +36,7 @@ pub(super) fn check_single(points: &[[f64; 3]], format: &str) -> Result<(), Form
         }
     }
     let size = (0..3).map(|axis| (high[axis] - low[axis]).max(0.0)).fold(0.0, f64::hypot);
-    if worst.is_finite() && worst <= TOLERANCE * size {
-        return Ok(());
-    }
-    Err(FormatError::Unwritable(format!(
-        "{format} holds single precision, which would move points by up to {worst:.1e} on a cloud of size \
-         {size:.1e}; write .ply or .pcd, which hold double precision, or subtract an offset first"
-    )))
+    (worst, size)
 }
 
 #[cfg(test)]

@@ -105,10 +105,10 @@ fn a_file_can_be_moved_in_place_or_into_another_format() {
     let path = folder.path().join("a.xyz");
     fs::write(&path, "# kept\n1 2 3 red\nnan 0 0 none\n").unwrap();
     let motion = Rigid { translation: [1.0, 0.0, 0.0].into(), ..Rigid::identity() };
-    assert_eq!(write_transformed(&path, &path, &motion).unwrap(), Kept::Everything);
+    assert_eq!(write_transformed(&path, &path, &motion).unwrap(), Kept::default());
     assert_eq!(fs::read_to_string(&path).unwrap(), "# kept\n2 2 3 red\nnan 0 0 none\n");
     let other = folder.path().join("b.ply");
-    assert_eq!(write_transformed(&path, &other, &motion).unwrap(), Kept::Points);
+    assert_eq!(write_transformed(&path, &other, &motion).unwrap().lost, ["column_4"]);
     assert_eq!(read_cloud_dropping_nan(&other).unwrap().0.points(), [[3.0, 2.0, 3.0]]);
     fs::write(&path, "1 2").unwrap();
     let error = write_transformed(&path, &other, &motion).unwrap_err().to_string();

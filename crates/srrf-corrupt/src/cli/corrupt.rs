@@ -101,16 +101,17 @@ pub fn corrupt(args: &CorruptArgs) -> Result<ExitCode, Failure> {
     let corrupted = PointCloud::new(moved.iter().map(|p| frame.undo(p)).collect())
         .map_err(|e| Failure::cloud(&input.name, &e))?;
     progress.step(format!("writing {output:?}"));
-    files::write_points(output, &corrupted)?;
+    let kept = files::write_points(output, &corrupted, &input)?;
     progress.clear();
     let added = origin.iter().filter(|o| o.is_none()).count();
     let dropped = match input.dropped {
         0 => String::new(),
         n => format!("; {} with NaN or infinity were left out before", count(n)),
     };
+    let precision = if kept.double.is_some() { format!("; {kept}") } else { String::new() };
     let out = Output::new(args.quiet.quiet, files::is_stream(output));
     out.say(&format!(
-        "wrote {}: {} {}, seed {seed}; {} became {}, {} of them new{dropped}",
+        "wrote {}: {} {}, seed {seed}; {} became {}, {} of them new{dropped}{precision}",
         output.display(),
         corruption.name(),
         args.severity,

@@ -193,22 +193,14 @@ impl RegisterArgs {
         }
         if let Some(path) = &self.save {
             begin(path);
-            let written = if outcome.scale.is_none_or(|scale| scale.factor == 1.0) {
-                files::write_moved(path, &source.file, pose)?
+            let whole = outcome.scale.is_none_or(|scale| scale.factor == 1.0);
+            let (what, kept) = if whole {
+                ("the moved source", files::write_moved(path, &source.file, pose)?)
             } else {
-                files::write_points(path, &source.cloud.transformed(pose))?;
-                Kept::Points
+                let moved = source.cloud.transformed(pose);
+                ("the points of the source, scaled and moved", files::write_points(path, &moved, source)?)
             };
-            let what = match written {
-                Kept::Points if outcome.scale.is_some() => {
-                    "the points of the source, scaled and moved, and nothing else"
-                }
-                Kept::Everything => "the moved source with all else that its file holds",
-                Kept::Points => {
-                    "the moved points of the source; another format than the source's keeps nothing else"
-                }
-            };
-            lines.push(wrote(path, what));
+            lines.push(wrote(path, &kept_words(what, &kept, whole)));
         }
         if let Some(path) = &self.json {
             begin(path);
@@ -236,6 +228,12 @@ impl RegisterArgs {
         }
         Ok(lines)
     }
+}
+
+/// What was written, and what of the original it has.
+fn kept_words(what: &str, kept: &Kept, whole: bool) -> String {
+    let kept = if whole { kept.to_string() } else { "and nothing else".to_owned() };
+    if kept.is_empty() { what.to_owned() } else { format!("{what} {kept}") }
 }
 
 fn wrote(path: &Path, what: &str) -> String {

@@ -1,5 +1,7 @@
 //! The header of a LAS file and its variable length records.
 
+use std::ops::Range;
+
 use laz::LazVlr;
 
 use super::super::FormatError;
@@ -107,22 +109,45 @@ impl LasHeader {
 
     /// What says how the points are compressed.
     pub fn laz(&self, bytes: &[u8]) -> Result<LazVlr, FormatError> {
+        let found = self.variable_records(bytes).into_iter().find(|record| self.is_laz_record(bytes, record));
+        match found {
+            Some(record) => laz_record::vlr(&bytes[record.start + VLR..record.end], self.record_length),
+            None => Err(FormatError::Content(
+                "the points are compressed, but no record says how (`laszip encoded`)".into(),
+            )),
+        }
+    }
+
+    /// Where the variable length records are, as far as they end before the points.
+    pub fn variable_records(&self, bytes: &[u8]) -> Vec<Range<usize>> {
+        let mut records = Vec::new();
         let mut at = self.length;
         for _ in 0..self.vlrs {
             let Some(length) = word(bytes, at + 20).map(u16::from_le_bytes) else { break };
-            let content = at + VLR..at + VLR + usize::from(length);
-            if content.end > self.points_at {
+            let end = at + VLR + usize::from(length);
+            if end > self.points_at {
                 break;
             }
-            let id = word(bytes, at + 18).map(u16::from_le_bytes);
-            if bytes[at + 2..].starts_with(LazVlr::USER_ID.as_bytes()) && id == Some(LazVlr::RECORD_ID) {
-                return laz_record::vlr(&bytes[content], self.record_length);
-            }
-            at = content.end;
+            records.push(at..end);
+            at = end;
         }
-        Err(FormatError::Content(
-            "the points are compressed, but no record says how (`laszip encoded`)".into(),
-        ))
+        records
+    }
+
+    /// Whether a record says how points are compressed.
+    pub fn is_laz_record(&self, bytes: &[u8], record: &Range<usize>) -> bool {
+        let id = word(bytes, record.start + 18).map(u16::from_le_bytes);
+        bytes[record.start + 2..].starts_with(LazVlr::USER_ID.as_bytes()) && id == Some(LazVlr::RECORD_ID)
+    }
+
+    /// Bytes of the header itself.
+    pub fn length(&self) -> usize {
+        self.length
+    }
+
+    /// The number of variable length records that the header says.
+    pub fn record_count(&self) -> u32 {
+        self.vlrs
     }
 
     /// Whether waveforms follow the points inside this file.
@@ -161,11 +186,24 @@ pub(super) fn put_axes(bytes: &mut [u8], axes: &[LasAxis; 3], points: &[[f64; 3]
     }
 }
 
-/// All before the points of a file of version 1.2 with points of format 0, and how they are
+/// The variable length record that says how points are compressed.
+pub(super) fn laz_record(vlr: &LazVlr) -> Result<Vec<u8>, FormatError> {
+    let content = laz_record::vlr_bytes(vlr)?;
+    let mut record = vec![0; VLR];
+    put_word(&mut record, 2, LazVlr::USER_ID.as_bytes());
+    put_word(&mut record, 18, &LazVlr::RECORD_ID.to_le_bytes());
+    put_word(&mut record, 20, &(content.len() as u16).to_le_bytes());
+    put_word(&mut record, 22, b"http://laszip.org");
+    record.extend(content);
+    Ok(record)
+}
+
+/// All before the points of a file of version 1.2 with points of a format and length, and how they are
 /// compressed.
 pub(super) fn new_header(
     points: &[[f64; 3]],
     axes: &[LasAxis; 3],
+    (format, record_length): (u8, usize),
     zipped: bool,
 ) -> Result<(Vec<u8>, Option<LazVlr>), FormatError> {
     let count = u32::try_from(points.len()).map_err(|_| {
@@ -177,8 +215,8 @@ pub(super) fn new_header(
     put_word(&mut bytes, 26, b"EXTRACTION");
     put_word(&mut bytes, 58, b"srrf");
     put_word(&mut bytes, 94, &(HEADER as u16).to_le_bytes());
-    put_word(&mut bytes, 104, &[if zipped { 0x80 } else { 0 }]);
-    put_word(&mut bytes, 105, &20u16.to_le_bytes());
+    put_word(&mut bytes, 104, &[if zipped { format | 0x80 } else { format }]);
+    put_word(&mut bytes, 105, &(record_length as u16).to_le_bytes());
     put_word(&mut bytes, 107, &count.to_le_bytes());
     put_word(&mut bytes, 111, &count.to_le_bytes());
     let rounded: Vec<[f64; 3]> = points
@@ -186,17 +224,10 @@ pub(super) fn new_header(
         .map(|p| std::array::from_fn(|axis| axes[axis].value(axes[axis].steps(p[axis]))))
         .collect();
     put_axes(&mut bytes, axes, &rounded);
-    let vlr = if zipped { Some(laz_record::new_vlr()?) } else { None };
+    let vlr = if zipped { Some(laz_record::new_vlr(format)?) } else { None };
     if let Some(vlr) = &vlr {
-        let content = laz_record::vlr_bytes(vlr)?;
-        let mut record = vec![0; VLR];
-        put_word(&mut record, 2, LazVlr::USER_ID.as_bytes());
-        put_word(&mut record, 18, &LazVlr::RECORD_ID.to_le_bytes());
-        put_word(&mut record, 20, &(content.len() as u16).to_le_bytes());
-        put_word(&mut record, 22, b"http://laszip.org");
         put_word(&mut bytes, 100, &1u32.to_le_bytes());
-        bytes.extend(record);
-        bytes.extend(content);
+        bytes.extend(laz_record(vlr)?);
     }
     let points_at = bytes.len() as u32;
     put_word(&mut bytes, 96, &points_at.to_le_bytes());

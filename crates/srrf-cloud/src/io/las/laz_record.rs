@@ -39,8 +39,8 @@ pub(super) fn vlr(content: &[u8], length: usize) -> Result<LazVlr, FormatError> 
     Ok(vlr)
 }
 
-pub(super) fn new_vlr() -> Result<LazVlr, FormatError> {
-    guarded(|| Ok(LazVlr::from_laz_items(LazItemRecordBuilder::default_for_point_format_id(0, 0)?)))
+pub(super) fn new_vlr(format: u8) -> Result<LazVlr, FormatError> {
+    guarded(|| Ok(LazVlr::from_laz_items(LazItemRecordBuilder::default_for_point_format_id(format, 0)?)))
 }
 
 pub(super) fn vlr_bytes(vlr: &LazVlr) -> Result<Vec<u8>, FormatError> {

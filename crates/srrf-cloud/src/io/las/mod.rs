@@ -2,6 +2,8 @@
 //! own, which checks every count before it is used (the `las` crate allocates by the header's
 //! words); the compression of LAZ is that of the `laz` crate.
 
+mod attributes;
+mod convert;
 mod header;
 mod laz_record;
 mod zipped;
@@ -11,7 +13,7 @@ use std::io::{self, Write};
 
 use self::header::{LasAxis, LasHeader};
 use super::scan::moved;
-use super::{CloudFormat, Contents, FormatError, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// LAS files, versions 1.0 to 1.4. Coordinates are 32-bit integers times a scale plus an offset;
@@ -42,8 +44,31 @@ impl CloudFormat for Las {
         read(bytes, options)
     }
 
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        read_attributes(bytes, options)
+    }
+
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&file(points, false)?)
+        self.write_cloud(&Outgoing::of_points(points), out)
+    }
+
+    fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
+        attributes::keeps(attribute, cloud)
+    }
+
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&file(cloud, false)?)
+    }
+
+    fn rewrite_from(
+        &self,
+        format: &str,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+    ) -> Option<io::Result<Vec<u8>>> {
+        let repack = |moved: Vec<u8>| convert::repacked(&moved, options, false);
+        (format == "laz").then(|| rewritten(bytes, options, motion).and_then(repack))
     }
 
     fn rewrite(
@@ -74,8 +99,31 @@ impl CloudFormat for Laz {
         read(bytes, options)
     }
 
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        read_attributes(bytes, options)
+    }
+
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&file(points, true)?)
+        self.write_cloud(&Outgoing::of_points(points), out)
+    }
+
+    fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
+        attributes::keeps(attribute, cloud)
+    }
+
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&file(cloud, true)?)
+    }
+
+    fn rewrite_from(
+        &self,
+        format: &str,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+    ) -> Option<io::Result<Vec<u8>>> {
+        let repack = |moved: Vec<u8>| convert::repacked(&moved, options, true);
+        (format == "las").then(|| rewritten(bytes, options, motion).and_then(repack))
     }
 
     fn rewrite(
@@ -95,6 +143,14 @@ fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
     let held = bytes.len() + if matches!(records, Cow::Owned(_)) { records.len() } else { 0 };
     options.check_points(held, records.len() / header.record_length)?;
     Ok(Contents::of_points(points(&header, &records)))
+}
+
+fn read_attributes(bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+    let header = LasHeader::parse(bytes)?;
+    let records = records(&header, bytes, options)?;
+    let held = bytes.len() + if matches!(records, Cow::Owned(_)) { records.len() } else { 0 };
+    options.check_memory("the attributes", held, records.len())?;
+    Ok(attributes::read(bytes[104] & 0x3f, header.record_length, &records))
 }
 
 /// The points of a file as records, uncompressed.
@@ -158,12 +214,15 @@ fn axes_for(points: &[[f64; 3]], coarsest: Option<[f64; 3]>) -> Result<[LasAxis;
     Ok(axes)
 }
 
-/// A whole file of version 1.2 with points of format 0.
-fn file(points: &[[f64; 3]], zipped: bool) -> io::Result<Vec<u8>> {
+/// A whole file of version 1.2 with points of format 0, or 2 where there are colours.
+fn file(cloud: &Outgoing<'_>, zipped: bool) -> io::Result<Vec<u8>> {
+    let points = cloud.points;
     let axes = axes_for(points, None)?;
-    let mut records = vec![0; points.len() * 20];
-    put_points(points, &axes, 20, &mut records);
-    let (mut bytes, vlr) = header::new_header(points, &axes, zipped)?;
+    let (length, format) = attributes::layout(cloud);
+    let mut records = vec![0; points.len() * length];
+    put_points(points, &axes, length, &mut records);
+    attributes::put(cloud, length, &mut records);
+    let (mut bytes, vlr) = header::new_header(points, &axes, (format, length), zipped)?;
     match vlr {
         Some(vlr) => zipped::compress(&mut bytes, vlr, &records)?,
         None => bytes.extend(records),

@@ -1,23 +1,27 @@
 //! NumPy arrays of points.
 
 mod array;
+mod columns;
 mod header;
 
 pub use array::Array;
+pub(super) use columns::{array_of, columns};
 
 use std::io::{self, Write};
 
 use self::header::{Descr, NpyHeader, NpyKind};
+use super::outgoing::stays_single;
 use super::scalar::Scalar;
 use super::scan::moved;
-use super::{CloudFormat, Contents, FormatError, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
 use crate::Rigid;
 
+const SINGLE: NpyKind = NpyKind { scalar: Scalar::F32, big_endian: false };
 const DOUBLE: NpyKind = NpyKind { scalar: Scalar::F64, big_endian: false };
 
 /// An array `[n, columns]` of at least 3 columns, in C or Fortran order, of single or double
 /// precision or integers, whose first three columns are x, y and z; or an array `[n]` with fields
-/// `x`, `y` and `z`. Written as `float64`. A moved copy keeps the other columns and fields as they
+/// `x`, `y` and `z`. Written as `float32` or `float64`. A moved copy keeps the other columns and fields as they
 /// are, normals too, the order, and the type where it holds the moved numbers (otherwise it becomes
 /// `float64`).
 pub(super) struct Npy;
@@ -42,9 +46,27 @@ impl CloudFormat for Npy {
         Ok(Contents { points: table.points(), single, ..Contents::default() })
     }
 
+    fn attributes(&self, bytes: &[u8], _: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        Ok(NpyTable::parse(bytes)?.attributes())
+    }
+
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&NpyHeader::bytes(&Descr::Plain(DOUBLE), false, &[points.len() as u64, 3]))?;
-        points.iter().flatten().try_for_each(|c| out.write_all(&c.to_le_bytes()))
+        self.write_cloud(&Outgoing::of_points(points), out)
+    }
+
+    fn has_both_precisions(&self) -> bool {
+        true
+    }
+
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        let kind = if cloud.single { SINGLE } else { DOUBLE };
+        out.write_all(&NpyHeader::bytes(&Descr::Plain(kind), false, &[cloud.points.len() as u64, 3]))?;
+        let mut row = Vec::with_capacity(24);
+        cloud.points.iter().try_for_each(|point| {
+            row.clear();
+            point.iter().for_each(|&c| kind.scalar.put(c, false, &mut row));
+            out.write_all(&row)
+        })
     }
 
     fn rewrite(
@@ -58,10 +80,9 @@ impl CloudFormat for Npy {
         options.check_points(bytes.len(), 2 * table.rows)?;
         let old = table.points();
         let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
-        let fits = |axis: usize| {
-            let kind = table.kinds[table.axes[axis]];
-            kind.scalar.for_moved(axis, &old, &new) == kind.scalar
-        };
+        let kind = |axis: usize| table.kinds[table.axes[axis]].scalar;
+        let single = (0..3).all(|axis| kind(axis).is_single()) && stays_single(&old, &new).is_ok();
+        let fits = |axis: usize| kind(axis).for_moved(axis, &old, &new, single) == kind(axis);
         let all_fit = (0..3).all(fits);
         // All columns of a plain array have one type.
         let kinds: Vec<NpyKind> = match &table.header.descr {
@@ -113,6 +134,20 @@ pub(super) struct NpyTable<'a> {
     layout: Vec<(usize, usize)>,
     /// The columns of x, y and z.
     axes: [usize; 3],
+}
+
+/// The name by which all formats know a field.
+pub(super) fn known(name: &str) -> String {
+    match &*name.to_ascii_lowercase() {
+        "r" => "red".into(),
+        "g" => "green".into(),
+        "b" => "blue".into(),
+        "normal_x" => "nx".into(),
+        "normal_y" => "ny".into(),
+        "normal_z" => "nz".into(),
+        "i" => "intensity".into(),
+        other => other.to_owned(),
+    }
 }
 
 /// Whether the array at the begin of `bytes` could be a cloud, and how many bytes it takes.
@@ -200,6 +235,19 @@ impl<'a> NpyTable<'a> {
             number.unwrap_or(f64::NAN)
         };
         (0..self.rows).map(|row| self.axes.map(|column| value(row, column))).collect()
+    }
+
+    /// The named fields but x, y and z.
+    fn attributes(&self) -> Vec<Attribute> {
+        let Descr::Fields(fields) = &self.header.descr else { return Vec::new() };
+        let others = fields.iter().enumerate().filter(|(column, _)| !self.axes.contains(column));
+        others
+            .map(|(column, (name, kind))| {
+                let places = (0..self.rows).map(|row| self.place(row, column));
+                let values = kind.scalar.column(self.body, kind.big_endian, places);
+                Attribute { name: known(name), values }
+            })
+            .collect()
     }
 
     /// Calls `each` with the row and the column of every number, in the order of the file.

@@ -1,5 +1,6 @@
 //! PCD, the format of the Point Cloud Library: text, binary, and binary compressed with LZF.
 
+mod attributes;
 mod body;
 mod header;
 mod lzf;
@@ -7,11 +8,11 @@ mod rewrite;
 
 use std::io::{self, Write};
 
-use super::{CloudFormat, Contents, FormatError, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// PCD files; the points are the fields `x`, `y` and `z`, wherever and of whatever type they are.
-/// Written as binary in double precision. A moved copy keeps all other fields, the grid and the
+/// Written as binary, in the precision that is asked for, colours packed in one number as PCL has them. A moved copy keeps all other fields, the grid and the
 /// viewpoint as they are; normals (`normal_x`, `normal_y`, `normal_z`) are turned.
 pub(super) struct Pcd;
 
@@ -32,14 +33,24 @@ impl CloudFormat for Pcd {
         body::read(bytes, options)
     }
 
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        attributes::read(bytes, options)
+    }
+
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        let n = points.len();
-        write!(
-            out,
-            "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\n\
-             COUNT 1 1 1\nWIDTH {n}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {n}\nDATA binary\n"
-        )?;
-        points.iter().flatten().try_for_each(|c| out.write_all(&c.to_le_bytes()))
+        self.write_cloud(&Outgoing::of_points(points), out)
+    }
+
+    fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
+        attributes::keeps(attribute, cloud)
+    }
+
+    fn has_both_precisions(&self) -> bool {
+        true
+    }
+
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        attributes::write(cloud, out)
     }
 
     fn rewrite(

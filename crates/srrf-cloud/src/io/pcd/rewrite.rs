@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use super::super::outgoing::stays_single;
 use super::super::scalar::Scalar;
 use super::super::scan::{Splice, moved, turned};
 use super::super::{FormatError, ReadOptions};
@@ -30,7 +31,9 @@ pub(super) fn rewrite(
     let header = PcdHeader::parse(bytes)?;
     let axes = header.axes()?;
     let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
-    let kinds = [0, 1, 2].map(|axis| header.fields[axes[axis]].scalar.for_moved(axis, &old, &new));
+    let kind = |axis: usize| header.fields[axes[axis]].scalar;
+    let single = (0..3).all(|axis| kind(axis).is_single()) && stays_single(&old, &new).is_ok();
+    let kinds = [0, 1, 2].map(|axis| kind(axis).for_moved(axis, &old, &new, single));
     let mut changes = vec![PcdChange { fields: axes, kinds, old, new }];
     let normals = header.triple(["normal_x", "normal_y", "normal_z"]);
 

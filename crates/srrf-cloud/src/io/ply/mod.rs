@@ -1,5 +1,6 @@
 //! PLY, the Stanford polygon format: text, and binary of both byte orders.
 
+mod attributes;
 mod body;
 mod faces;
 mod header;
@@ -7,11 +8,11 @@ mod rewrite;
 
 use std::io::{self, Write};
 
-use super::{CloudFormat, Contents, FormatError, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// PLY files; the points are the `x`, `y` and `z` of the element `vertex`, whatever else it and the
-/// other elements hold. Written as binary little endian in double precision. A moved copy keeps
+/// other elements hold. Written as binary little endian, in the precision that is asked for. A moved copy keeps
 /// faces, colours and all other properties as they are; normals (`nx`, `ny`, `nz`) are turned.
 pub(super) struct Ply;
 
@@ -32,11 +33,28 @@ impl CloudFormat for Ply {
         body::read(bytes, options)
     }
 
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        attributes::read(bytes, options)
+    }
+
+    fn left_out(&self, bytes: &[u8], _: &ReadOptions) -> Result<Vec<String>, FormatError> {
+        attributes::left_out(bytes)
+    }
+
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        let axes = "property double x\nproperty double y\nproperty double z";
-        let count = points.len();
-        write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{axes}\nend_header\n")?;
-        points.iter().flatten().try_for_each(|c| out.write_all(&c.to_le_bytes()))
+        self.write_cloud(&Outgoing::of_points(points), out)
+    }
+
+    fn keeps(&self, attribute: &Attribute, _: &Outgoing<'_>) -> bool {
+        attributes::keeps(attribute)
+    }
+
+    fn has_both_precisions(&self) -> bool {
+        true
+    }
+
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        attributes::write(cloud, out)
     }
 
     fn rewrite(

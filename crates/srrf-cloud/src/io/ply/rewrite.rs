@@ -4,6 +4,7 @@ use std::io::{self, Write};
 use std::ops::Range;
 
 use super::super::ReadOptions;
+use super::super::outgoing::stays_single;
 use super::super::scalar::Scalar;
 use super::super::scan::{Splice, moved, put_number, turned};
 use super::body::{Cursor, read};
@@ -36,9 +37,11 @@ pub(super) fn rewrite(
     let new_points: Vec<[f64; 3]> = points.iter().map(|&p| moved(motion, p)).collect();
     let scalar = |property: usize| element.properties[property].scalar;
 
+    let single =
+        axes.iter().all(|&axis| scalar(axis).is_single()) && stays_single(&points, &new_points).is_ok();
     let mut changes: Vec<PlyChange> = (0..3)
         .map(|axis| {
-            let kind = scalar(axes[axis]).for_moved(axis, &points, &new_points);
+            let kind = scalar(axes[axis]).for_moved(axis, &points, &new_points, single);
             PlyChange { property: axes[axis], triple: 0, axis, kind }
         })
         .collect();

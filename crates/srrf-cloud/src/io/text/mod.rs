@@ -1,12 +1,15 @@
 //! Plain text: one point a line, at least three numbers.
 
+mod attributes;
 mod row;
 
 use std::io::{self, Write};
 
+pub(super) use self::attributes::fits_single;
+use self::attributes::{ColumnCollector, OtherColumns};
 use self::row::{Style, TextRow};
-use super::scan::{ByteLines, Line, Splice, moved, write_rows};
-use super::{CloudFormat, Contents, FormatError, ReadOptions};
+use super::scan::{ByteLines, Line, Splice, moved};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// Numbers separated by spaces, tabs, commas or semicolons, a line for each point. x, y and z are
@@ -56,8 +59,51 @@ impl CloudFormat for Text {
         }
     }
 
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        Ok(other_columns(bytes, options)?.attributes())
+    }
+
+    fn left_out(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<String>, FormatError> {
+        Ok(other_columns(bytes, options)?.words())
+    }
+
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        write_rows(points, "", out)
+        self.write_cloud(&Outgoing::of_points(points), out)
+    }
+
+    fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
+        attributes::keeps(attribute, cloud)
+    }
+
+    fn has_both_precisions(&self) -> bool {
+        true
+    }
+
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        attributes::write(cloud, out)
+    }
+
+    /// A `.csv` has a title and commas, a `.pts` its count, an `.xyz` spaces; any text will do elsewhere.
+    fn conforms(&self, bytes: &[u8], extension: &str) -> bool {
+        let mut first = None;
+        let announced = parse(bytes, |line, row| {
+            first.get_or_insert((line.start, row.style));
+            Ok::<_, FormatError>(())
+        });
+        let Some((start, style)) = first else { return true };
+        let head = &bytes[..start];
+        match extension {
+            "csv" => {
+                matches!(style, Style::Comma | Style::Semicolon)
+                    && ByteLines::new(head).any(|line| is_title(line.text))
+            }
+            "pts" => style == Style::Space && matches!(announced, Ok(Some(_))),
+            "xyz" => {
+                let passed_over = |text: &[u8]| text.trim_ascii().is_empty() || is_comment(text);
+                style == Style::Space && ByteLines::new(head).all(|line| passed_over(line.text))
+            }
+            _ => true,
+        }
     }
 
     fn rewrite(
@@ -80,6 +126,14 @@ impl CloudFormat for Text {
         })?;
         splice.finish()
     }
+}
+
+/// The columns that are not the place of the points.
+fn other_columns(bytes: &[u8], options: &ReadOptions) -> Result<OtherColumns, FormatError> {
+    let mut collector = ColumnCollector::default();
+    let announced =
+        parse(bytes, |line, row| collector.take(line.start, line.text, &row, bytes.len(), options))?;
+    Ok(collector.finish(bytes, announced.is_some()))
 }
 
 /// Goes through the points; the number of them that the first line announces.
