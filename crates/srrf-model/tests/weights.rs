@@ -100,6 +100,44 @@ fn broken_files_are_named() {
 }
 
 #[test]
+fn equal_weights_have_equal_bytes() {
+    let first = bytes();
+    assert!((0..5).all(|_| bytes() == first));
+}
+
+/// Nothing is built with sizes that only a header claims: they would take terabytes.
+#[test]
+fn sizes_in_a_header_are_checked_before_they_are_believed() {
+    type Change = fn(&mut SrrfConfig);
+    let of_range: [(&str, Change); 4] = [
+        ("dense.sfe.width", |c| c.dense.sfe.width = 1 << 50),
+        ("skeleton.sfe.layers", |c| c.skeleton.sfe.layers = 1 << 40),
+        ("dense.tokens", |c| c.dense.tokens = 1 << 60),
+        ("sem.levels[0].widths[0]", |c| c.sem.levels[0].widths[0] = 1 << 40),
+    ];
+    let with = |change: Change| {
+        rewritten(|_, header| {
+            let mut config = tiny();
+            change(&mut config);
+            header.insert("srrf_config".into(), serde_json::to_string(&config).unwrap());
+        })
+    };
+    for (key, change) in of_range {
+        match read(&with(change)) {
+            Err(WeightsError::Header { why, .. }) => assert!(why.contains(key), "{why}"),
+            other => panic!("{key}: {other:?}"),
+        }
+    }
+    // In their ranges, and far beyond what the file holds: 64 layers of 8,192 channels.
+    let wide = with(|c| {
+        let sfe = &mut c.dense.sfe;
+        (sfe.width, sfe.mlp, sfe.layers, sfe.heads) = (8192, 8192, 64, 1);
+        c.dense.pfi.heads = 1;
+    });
+    assert!(matches!(read(&wide), Err(WeightsError::Parameter { .. })));
+}
+
+#[test]
 fn weights_of_another_architecture_are_named() {
     let message = |bytes: &[u8]| match read(bytes) {
         Err(error @ WeightsError::Parameter { .. }) => error.to_string(),

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 use srrf_model::weights::{LoadedModel, with_config};
 use srrf_model::{SrrfConfig, device, embedded};
 
-use srrf_args::words::count;
+use srrf_args::words::{count, visible};
 use srrf_args::{Failure, OutputKind, Places, files};
 
 /// List the models in the program, show their cards, check files of weights.
@@ -137,10 +137,12 @@ fn verify(weights: &str, sha256: Option<&str>) -> Result<String, Failure> {
             same = format!("\nthe same as {name} in this program");
         }
     }
+    // What others wrote is one line, and commands no terminal.
+    let name = visible(&loaded.name).replace('\n', " ");
     let matches = if sha256.is_some() { "\nthe SHA-256 is the one that was asked for" } else { "" };
     Ok(format!(
         "{weights}: {}, complete, {} parameters, all finite\nSHA-256 {}{same}{matches}",
-        loaded.name,
+        name,
         count(loaded.parameter_count()),
         loaded.sha256
     ))
