@@ -27,6 +27,10 @@ impl OutputKind {
     pub const JSON: Self = Self { what: "JSON", extensions: &["json"] };
     /// JSON objects, one a line.
     pub const JSON_LINES: Self = Self { what: "JSON lines", extensions: &["jsonl", "ndjson"] };
+    /// Poses, one a line, as the TUM benchmark has them.
+    pub const TUM: Self = Self { what: "poses of TUM", extensions: &["tum", "txt"] };
+    /// Poses, one a line, as KITTI has them.
+    pub const KITTI: Self = Self { what: "poses of KITTI", extensions: &["kitti", "txt"] };
     /// A Rerun recording.
     pub const RECORDING: Self = Self { what: "a Rerun recording", extensions: &["rrd"] };
     /// A PLY file.

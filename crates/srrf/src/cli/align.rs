@@ -10,8 +10,8 @@ use srrf::{Options, Registrar};
 use srrf_align::{AlignError, AlignOptions, AlignProgress, AlignStage, Map};
 use srrf_args::flags::{Common, value};
 use srrf_args::words::{count, counted, length};
-use srrf_args::{Failure, Output, Progress, files, interrupt};
-use srrf_cloud::io::ReadOptions;
+use srrf_args::{Failure, Output, OutputKind, Places, Progress, files, interrupt};
+use srrf_cloud::io::{ReadOptions, is_cloud_file};
 
 use super::align_edges::EdgeFile;
 use super::align_initial::{self, EarlierMap};
@@ -166,24 +166,30 @@ impl AlignArgs {
                 "--all-pairs tries all pairs, --sequence those in order: give one of them".into(),
             ));
         }
-        let outputs = [&self.output, &self.tum, &self.kitti, &self.merge.save, &self.html];
-        outputs.into_iter().flatten().try_for_each(|path| files::check_output(path))?;
         self.merge.check()?;
-        if let Some(path) = &self.edges {
-            if files::is_stream(path) {
-                return Err(Failure::usage(
-                    "--edges is a file that is read and written: it cannot be `-`".into(),
-                ));
+        if self.edges.as_deref().is_some_and(files::is_stream) {
+            return Err(Failure::usage(
+                "--edges is a file that is read and written: it cannot be `-`".into(),
+            ));
+        }
+        let mut places =
+            Places::new().reads("--add", self.add.as_deref()).reads("--initial", self.initial.as_deref());
+        for scan in &self.scans {
+            let inside = std::fs::read_dir(scan).into_iter().flatten().flatten().map(|entry| entry.path());
+            for file in inside.filter(|file| is_cloud_file(file)) {
+                places = places.reads("a scan", &*file);
             }
-            files::check_output(path)?;
+            places = places.reads("a scan", Some(&**scan).filter(|scan| !scan.is_dir()));
         }
-        let streams = outputs.into_iter().flatten().filter(|path| files::is_stream(path)).count();
-        if streams > 1 {
-            return Err(Failure::usage(format!(
-                "{streams} results are to go to `-`: standard output takes one; name files for the others"
-            )));
-        }
-        Ok(Output::new(self.common.quiet.quiet, streams > 0))
+        let places = places
+            .writes("--output", self.output.as_deref(), OutputKind::JSON)?
+            .writes("--tum", self.tum.as_deref(), OutputKind::TUM)?
+            .writes("--kitti", self.kitti.as_deref(), OutputKind::KITTI)?
+            .writes("--html", self.html.as_deref(), OutputKind::PAGE)?
+            .writes("--edges", self.edges.as_deref(), OutputKind::JSON_LINES)?
+            .writes_cloud("--save", self.merge.save.as_deref())?;
+        places.check()?;
+        Ok(Output::new(self.common.quiet.quiet, places.takes_standard_output()))
     }
 
     fn open(&self, known: Option<&EarlierMap>) -> Result<ScanFiles, Failure> {
