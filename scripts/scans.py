@@ -20,6 +20,8 @@ local method, so it is not expected to solve random poses.
 """
 
 import argparse
+import collections
+import contextlib
 import datetime
 import json
 import os
@@ -71,34 +73,65 @@ def cloud(points):
     return c
 
 
+def write(path, points):
+    """A PLY of float32, which small_gicp's reader needs."""
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+    path.write_bytes(head.encode() + np.ascontiguousarray(points, "<f4").tobytes())
+
+
+Used = collections.namedtuple("Used", "wall cpu mib")
+
+
 def run(command):
-    """Runs a process; its wall and CPU seconds."""
-    begun = time.perf_counter()
-    process = subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    said = process.stderr.read().decode()
-    _, status, used = os.wait4(process.pid, 0)
-    if os.waitstatus_to_exitcode(status) not in (0, 3):
-        sys.exit(said)
-    return time.perf_counter() - begun, used.ru_utime + used.ru_stime
+    """Runs a process; its wall and CPU seconds and its memory."""
+    with tempfile.TemporaryFile() as said:
+        begun = time.perf_counter()
+        process = subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=said)
+        status, kib = pathlib.Path(f"/proc/{process.pid}/status"), 0
+        while True:
+            # What the kernel reports at the end holds the memory of this script, from before the program was loaded.
+            with contextlib.suppress(OSError):
+                kib = max([kib, *(int(line.split()[1]) for line in status.read_text().splitlines() if line.startswith("VmHWM"))])
+            ended, code, used = os.wait4(process.pid, os.WNOHANG)
+            if ended:
+                break
+            time.sleep(0.005)
+        wall = time.perf_counter() - begun
+        said.seek(0)
+        if os.waitstatus_to_exitcode(code) not in (0, 3):
+            sys.exit(said.read().decode())
+    return Used(wall, used.ru_utime + used.ru_stime, kib / 1024)
+
+
+def result_of_srrf(program, files, folder, threads):
+    """Its pose, what the process used, and all that it says."""
+    out = folder / "result.json"
+    used = run([program, "register", *files, "--json", out, "--threads", threads, "--quiet"])
+    result = json.loads(out.read_text())
+    return np.array(result["target_from_source"]), used, result
 
 
 def by_srrf(program, files, folder, threads):
-    out = folder / "result.json"
-    wall, cpu = run([program, "register", *files, "--json", out, "--threads", threads, "--quiet"])
+    pose, used, result = result_of_srrf(program, files, folder, threads)
+    return pose, used.wall, used.cpu, None, result["probability"]
+
+
+def result_of_peer(name, files, folder, voxel, threads):
+    """Its pose, what the process used, and its seconds without start and reading."""
+    out = folder / "pose.json"
+    used = run([sys.executable, __file__, "--job", name, *files, out, voxel, threads])
     result = json.loads(out.read_text())
-    return np.array(result["target_from_source"]), wall, cpu, None, result["probability"]
+    return np.array(result["pose"]), used, result["seconds"]
 
 
 def by_peer(name, files, folder, voxel, threads):
-    out = folder / "pose.json"
-    wall, cpu = run([sys.executable, __file__, "--job", name, *files, out, voxel, threads])
-    result = json.loads(out.read_text())
-    return np.array(result["pose"]), wall, cpu, result["seconds"], None
+    pose, used, seconds = result_of_peer(name, files, folder, voxel, threads)
+    return pose, used.wall, used.cpu, seconds, None
 
 
 def job(name, source, target, out, voxel, threads):
     """What one of the peers does in its own process."""
-    work = {"open3d": by_open3d, "small_gicp": by_small_gicp}[name]
+    work = {"open3d": by_open3d, "small_gicp": by_small_gicp, "kiss": by_kiss}[name]
     pose, seconds = work(source, target, float(voxel), int(threads))
     pathlib.Path(out).write_text(json.dumps({"pose": np.asarray(pose).tolist(), "seconds": seconds}))
 
@@ -137,6 +170,23 @@ def by_small_gicp(source, target, voxel, threads):
     found = small_gicp.align(
         target, source, registration_type="GICP", downsampling_resolution=voxel / 2,
         max_correspondence_distance=4 * voxel, num_threads=threads)
+    return found.T_target_source, time.perf_counter() - begun
+
+
+def by_kiss(source, target, voxel, threads):
+    """KISS-Matcher with its defaults, then GICP from there."""
+    import kiss_matcher
+    import small_gicp
+
+    source, target = (small_gicp.read_ply(path).points()[:, :3] for path in (source, target))
+    begun = time.perf_counter()
+    found = kiss_matcher.KISSMatcher(kiss_matcher.KISSMatcherConfig(voxel_size=voxel)).estimate(
+        source.astype(np.float32), target.astype(np.float32))
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = np.asarray(found.rotation), np.asarray(found.translation).ravel()
+    found = small_gicp.align(
+        target, source, pose, registration_type="GICP", downsampling_resolution=voxel / 2,
+        max_correspondence_distance=2 * voxel, num_threads=threads)
     return found.T_target_source, time.perf_counter() - begun
 
 

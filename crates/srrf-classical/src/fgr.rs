@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use srrf_cloud::{PairFrame, Register, RegisterError, Registration, Rigid, Solid};
 use srrf_refine::{Deformed, Match, NormalEquations, RefineConfig, RefineTarget};
 
-use crate::correspond::{Correspondences, correspond};
+use crate::correspond::{FeatureMatches, correspond};
 use crate::fpfh_cloud::FpfhCloud;
 
 /// Settings of [`Fgr`]. Defaults are Open3D's where not said otherwise; lengths are in voxels, which
@@ -99,7 +99,7 @@ type PointPair = ([f64; 3], [f64; 3]);
 
 /// The matches of random triples whose edges have like lengths in both clouds (section 3.1 of the
 /// paper); all matches where hardly any triple passes.
-fn tuple_test(matches: &Correspondences, config: &FgrConfig) -> Vec<PointPair> {
+fn tuple_test(matches: &FeatureMatches, config: &FgrConfig) -> Vec<PointPair> {
     let all: Vec<PointPair> = matches
         .pairs
         .iter()
@@ -193,8 +193,13 @@ mod tests {
         let mut point = || -> [f64; 3] { std::array::from_fn(|_| rng.random_range(-1.0..1.0)) };
         let source: Vec<[f64; 3]> = (0..200).map(|_| point()).collect();
         let target = source.iter().enumerate().map(|(i, p)| if i < 100 { *p } else { point() }).collect();
-        let matches =
-            Correspondences { source, target, voxel: 0.1, pairs: (0..200).map(|i| (i, i)).collect() };
+        let matches = FeatureMatches {
+            source,
+            target,
+            voxel: 0.1,
+            pairs: (0..200).map(|i| (i, i)).collect(),
+            one_way: vec![],
+        };
         let kept = tuple_test(&matches, &FgrConfig::default());
         let right = kept.iter().filter(|(x, y)| x == y).count();
         assert!(kept.len() > 300 && right as f64 > 0.9 * kept.len() as f64, "{right} of {}", kept.len());

@@ -11,8 +11,10 @@ const BINS: usize = 11;
 /// Length of a descriptor, padded from 33 for the vector units; the rest is 0.
 pub const WIDTH: usize = 36;
 /// Most neighbours of a histogram, as in Open3D's examples.
-const MOST_NEIGHBOURS: usize = 100;
-/// Neighbours of a normal. Open3D takes up to 30 within 2 voxels, where a thinned surface has about 13.
+const NEAREST: usize = 100;
+/// Most neighbours where they are to represent the whole neighbourhood.
+const THROUGHOUT: usize = 200;
+/// NeighbourChoice of a normal. Open3D takes up to 30 within 2 voxels, where a thinned surface has about 13.
 const NORMAL_NEIGHBOURS: usize = 15;
 
 /// A descriptor: 33 numbers, each block of 11 sums to 100 (0 for a point alone), then zeros.
@@ -26,7 +28,16 @@ pub type Descriptor = [f32; WIDTH];
 /// inverse squared distance, as in Open3D, plus its own. Normals point away from the mean of the cloud, so that the
 /// descriptors do not change with the pose.
 pub fn fpfh(points: &[[f64; 3]], radius: f64) -> Result<Vec<Descriptor>, CloudError> {
-    Ok(Oriented::new(points)?.describe(radius))
+    Ok(Oriented::new(points)?.describe(radius, NeighbourChoice::Nearest))
+}
+
+/// Which of the points within the radius make a histogram, where there are very many.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum NeighbourChoice {
+    /// The nearest 100. Beyond some 6 point spacings the radius then says nothing: a surface has more within it.
+    Nearest,
+    /// 200 at all distances.
+    Throughout,
 }
 
 /// Indexed points with normals: what descriptors of every radius begin with.
@@ -45,15 +56,27 @@ impl Oriented {
     }
 
     /// As [`fpfh`].
-    pub fn describe(&self, radius: f64) -> Vec<Descriptor> {
+    pub fn describe(&self, radius: f64, of: NeighbourChoice) -> Vec<Descriptor> {
         let (points, normals) = (self.index.points(), &self.normals);
         let neighbours: Vec<Vec<(usize, f64)>> =
-            points.par_iter().map(|p| self.index.within(p, radius, MOST_NEIGHBOURS)).collect();
+            points.par_iter().map(|p| self.neighbours(p, radius, of)).collect();
         let simple: Vec<[f64; 3 * BINS]> = (0..points.len())
             .into_par_iter()
             .map(|i| simplified(i, points, normals, &neighbours[i]))
             .collect();
         (0..points.len()).into_par_iter().map(|i| descriptor(&simple, i, &neighbours[i])).collect()
+    }
+
+    fn neighbours(&self, point: &[f64; 3], radius: f64, of: NeighbourChoice) -> Vec<(usize, f64)> {
+        if of == NeighbourChoice::Nearest {
+            return self.index.within(point, radius, NEAREST);
+        }
+        let all = self.index.within(point, radius, usize::MAX);
+        if all.len() <= THROUGHOUT {
+            return all;
+        }
+        // Sorted by distance.
+        (0..THROUGHOUT).map(|k| all[k * all.len() / THROUGHOUT]).collect()
     }
 }
 
@@ -156,6 +179,19 @@ mod tests {
         let same = a.iter().zip(&b).filter(|(x, y)| distance(x, y) < 30.0).count();
         assert!(same as f64 > 0.95 * a.len() as f64, "{same} of {}", a.len());
         assert!(distance(&a[0], &a[200]) > 30.0);
+    }
+
+    #[test]
+    fn wide_neighbourhoods_differ_where_they_are_heard_throughout() {
+        let flat: Vec<[f64; 3]> = (0..2500).map(|i| [f64::from(i % 50), f64::from(i / 50), 0.0]).collect();
+        let oriented = Oriented::new(&flat).unwrap();
+        let reach = |radius, of| oriented.neighbours(&flat[1275], radius, of).last().unwrap().1.sqrt();
+        assert!(reach(8.0, NeighbourChoice::Nearest) < 6.0 && reach(12.0, NeighbourChoice::Nearest) < 6.0);
+        for radius in [8.0, 12.0] {
+            let found = oriented.neighbours(&flat[1275], radius, NeighbourChoice::Throughout);
+            assert!(found.len() == THROUGHOUT || radius < 8.5 && found.len() > 190, "{}", found.len());
+            assert!(reach(radius, NeighbourChoice::Throughout) > 0.9 * radius);
+        }
     }
 
     #[test]

@@ -3,9 +3,11 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use srrf_cloud::{CloudError, PointCloud, RegisterError, Solid, VoxelError, point_spacing, voxel_downsample};
+use srrf_cloud::{
+    CloudError, PointCloud, RegisterError, Solid, VoxelError, point_spacing, voxel_downsample_to,
+};
 
-use crate::fpfh::{Descriptor, Oriented};
+use crate::fpfh::{Descriptor, NeighbourChoice, Oriented};
 use crate::memo::Memo;
 
 /// Thinned clouds that are kept with their descriptors: a pair uses one.
@@ -22,7 +24,8 @@ const KEPT_COUNTS: usize = 256;
 pub struct FpfhCloud<'a> {
     cloud: Cow<'a, PointCloud>,
     spacing: f64,
-    counts: Memo<u64, usize>,
+    /// How many points a size of voxels was found to leave more than.
+    too_fine: Memo<u64, usize>,
     levels: Memo<u64, ThinCloud>,
 }
 
@@ -32,7 +35,7 @@ pub(crate) struct ThinCloud {
     /// Shape `[n, 3]`.
     pub points: Vec<[f64; 3]>,
     oriented: Memo<(), Oriented>,
-    described: Memo<u64, Vec<Descriptor>>,
+    described: Memo<(u64, NeighbourChoice), Vec<Descriptor>>,
 }
 
 impl<'a> FpfhCloud<'a> {
@@ -44,7 +47,7 @@ impl<'a> FpfhCloud<'a> {
         Ok(Self {
             spacing: point_spacing(cloud.points())?,
             cloud: Cow::Borrowed(cloud.cloud()),
-            counts: Memo::new(KEPT_COUNTS),
+            too_fine: Memo::new(KEPT_COUNTS),
             levels: Memo::new(KEPT_LEVELS),
         })
     }
@@ -63,7 +66,7 @@ impl<'a> FpfhCloud<'a> {
         FpfhCloud {
             cloud: Cow::Owned(self.cloud.into_owned()),
             spacing: self.spacing,
-            counts: self.counts,
+            too_fine: self.too_fine,
             levels: self.levels,
         }
     }
@@ -80,15 +83,18 @@ impl<'a> FpfhCloud<'a> {
         if let Some(level) = self.levels.find(&key) {
             return Ok(fits(level));
         }
-        if self.counts.find(&key).is_some_and(|count| *count > most) {
+        if self.too_fine.find(&key).is_some_and(|tried| *tried >= most) {
             return Ok(None);
         }
-        let points = voxel_downsample(&self.cloud, voxel)?.into_points();
-        if points.len() > most {
-            self.counts.keep(key, points.len());
+        let Some(thin) = voxel_downsample_to(&self.cloud, voxel, most)? else {
+            self.too_fine.keep(key, most);
             return Ok(None);
-        }
-        let level = ThinCloud { points, oriented: Memo::new(1), described: Memo::new(KEPT_RADII) };
+        };
+        let level = ThinCloud {
+            points: thin.into_points(),
+            oriented: Memo::new(1),
+            described: Memo::new(KEPT_RADII),
+        };
         Ok(fits(self.levels.keep(key, level)))
     }
 }
@@ -98,10 +104,10 @@ impl ThinCloud {
     ///
     /// # Errors
     /// [`CloudError::TooFew`] under 3 points.
-    pub fn described(&self, radius: f64) -> Result<Arc<Vec<Descriptor>>, CloudError> {
-        self.described.get(radius.to_bits(), || {
+    pub fn described(&self, radius: f64, of: NeighbourChoice) -> Result<Arc<Vec<Descriptor>>, CloudError> {
+        self.described.get((radius.to_bits(), of), || {
             let oriented = self.oriented.get((), || Oriented::new(&self.points))?;
-            Ok(oriented.describe(radius))
+            Ok(oriented.describe(radius, of))
         })
     }
 }
@@ -110,6 +116,8 @@ impl ThinCloud {
 mod tests {
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
+
+    use srrf_cloud::voxel_downsample;
 
     use super::*;
     use crate::fpfh::fpfh;
@@ -129,13 +137,17 @@ mod tests {
             let thin = voxel_downsample(&cloud, voxel).unwrap();
             assert_eq!(level.points, thin.points());
             for radius in [0.5, 0.4, 0.5] {
-                assert_eq!(*level.described(radius).unwrap(), fpfh(thin.points(), radius).unwrap());
+                assert_eq!(
+                    *level.described(radius, NeighbourChoice::Nearest).unwrap(),
+                    fpfh(thin.points(), radius).unwrap()
+                );
             }
         }
         let (one, two) =
             (ready.thinned(0.3, 700).unwrap().unwrap(), ready.thinned(0.3, 700).unwrap().unwrap());
         assert!(Arc::ptr_eq(&one, &two), "thinned once");
-        assert!(Arc::ptr_eq(&one.described(0.5).unwrap(), &two.described(0.5).unwrap()), "described once");
+        let described = |level: &ThinCloud| level.described(0.5, NeighbourChoice::Nearest).unwrap();
+        assert!(Arc::ptr_eq(&described(&one), &described(&two)), "described once");
     }
 
     #[test]

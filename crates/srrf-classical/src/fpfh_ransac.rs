@@ -6,7 +6,8 @@ use srrf_refine::{Deformed, RefineConfig, RefineTarget};
 
 use crate::correspond::correspond;
 use crate::fpfh_cloud::FpfhCloud;
-use crate::ransac::{ConsensusSearch, ransac};
+use crate::graph_consensus::GraphConsensus;
+use crate::ransac::RansacConsensus;
 
 /// Settings of [`FpfhRansac`]. Lengths are in voxels, and the voxel follows from the clouds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -76,7 +77,7 @@ impl FpfhRansac {
     ) -> Result<Hypotheses, RegisterError> {
         let config = &self.config;
         let matches = correspond(source, target, config.points, config.feature_voxels, 30)?;
-        let search = ConsensusSearch {
+        let search = RansacConsensus {
             max_iterations: config.max_iterations,
             confidence: config.confidence,
             edge_similarity: config.edge_similarity,
@@ -84,7 +85,7 @@ impl FpfhRansac {
             keep: config.hypotheses.max(1),
             seed: config.seed,
         };
-        let (found, drawn) = ransac(&matches, &search);
+        let (found, drawn) = search.poses(&matches.correspondences(false)?);
         if found.is_empty() {
             return Err(RegisterError::NoPose(format!(
                 "none of {drawn} samples of {} matches was consistent; the clouds may not overlap, or \
@@ -92,7 +93,32 @@ impl FpfhRansac {
                 matches.pairs.len()
             )));
         }
-        Ok(Hypotheses { poses: found.iter().map(|h| h.pose).collect(), drawn })
+        Ok(Hypotheses { poses: found.iter().map(|p| p.target_from_source).collect(), drawn })
+    }
+
+    /// The poses on which most matches agree by [`GraphConsensus`], best first, without refinement: at most
+    /// [`FpfhRansacConfig::hypotheses`]. It also looks at matches that hold in one direction only, of which few are right.
+    ///
+    /// # Errors
+    /// As [`FpfhRansac::hypotheses`].
+    pub fn graph_hypotheses(
+        &self,
+        source: &FpfhCloud<'_>,
+        target: &FpfhCloud<'_>,
+    ) -> Result<Hypotheses, RegisterError> {
+        let config = &self.config;
+        let matches = correspond(source, target, config.points, config.feature_voxels, 30)?;
+        let search = GraphConsensus {
+            distance: config.distance_voxels * matches.voxel,
+            keep: config.hypotheses.max(1),
+            ..GraphConsensus::default()
+        };
+        let all = matches.correspondences(true)?;
+        let found = search.poses(&all);
+        if found.is_empty() {
+            return Err(RegisterError::NoPose(format!("no three of {} matches agree", all.len())));
+        }
+        Ok(Hypotheses { poses: found.iter().map(|p| p.target_from_source).collect(), drawn: 0 })
     }
 }
 

@@ -5,99 +5,104 @@ use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 use srrf_cloud::Rigid;
 
-use crate::correspond::Correspondences;
+use crate::consensus::{Correspondences, SupportedPose, keep_diverse, squared};
 
 /// Hypotheses that one generator draws.
 const BATCH: usize = 512;
 /// Batches between two looks at the stopping rule. Fixed, so that threads do not matter.
 const BATCHES_A_ROUND: usize = 16;
 
-/// How to search.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct ConsensusSearch {
+/// Random sample consensus over matches (Fischler and Bolles 1981).
+///
+/// A sample is three matches. It is dropped if an edge differs in length between the clouds by more than `edge_similarity` allows, or
+/// if its own fit leaves one of the three beyond `distance` (both as in Open3D). The search ends when a better consensus would have
+/// been found with probability `confidence`, and the best poses are fitted to their inliers (locally optimised RANSAC, Chum et al.
+/// 2003). The same matches give the same poses, with any number of threads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RansacConsensus {
+    /// Most samples. Default 100,000, as in Open3D.
     pub max_iterations: usize,
+    /// Default 0.999, as in Open3D.
     pub confidence: f64,
+    /// Least ratio of an edge's lengths in the two clouds. Default 0.9, as in Open3D's tutorial.
     pub edge_similarity: f64,
-    /// Matches closer than this are inliers.
+    /// Matches closer than this are inliers, in the unit of the points. Default 1: set it.
     pub distance: f64,
-    /// Hypotheses to keep.
+    /// Poses to find: each differs from the others by 10 degrees or 10 distances. Default 4.
     pub keep: usize,
+    /// Seed of the samples. Default 0.
     pub seed: u64,
 }
 
-/// A pose and the matches that agree with it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Hypothesis {
-    pub pose: Rigid,
-    pub inliers: usize,
-    /// Sum of the inliers' squared distances, to tell equals apart.
-    squares: f64,
-}
-
-impl Hypothesis {
-    fn beats(&self, other: &Self) -> bool {
-        (self.inliers, -self.squares) > (other.inliers, -other.squares)
-    }
-}
-
-/// The best hypotheses, best first, and the number of samples drawn.
-///
-/// A sample is three matches. It is dropped if an edge differs in length between the clouds by more than
-/// `edge_similarity` allows, or if its own fit leaves one of the three beyond `distance` (both as in
-/// Open3D). The search ends when a better consensus would have been found with probability `confidence`.
-pub(crate) fn ransac(matches: &Correspondences, search: &ConsensusSearch) -> (Vec<Hypothesis>, usize) {
-    let pairs: Vec<([f64; 3], [f64; 3])> = matches
-        .pairs
-        .iter()
-        .map(|&(i, j)| (matches.source[i as usize], matches.target[j as usize]))
-        .collect();
-    let mut best: Vec<Hypothesis> = Vec::new();
-    let mut drawn = 0;
-    if pairs.len() < 3 {
-        return (best, drawn);
-    }
-    let mut needed = search.max_iterations;
-    let mut round = 0;
-    while drawn < needed.min(search.max_iterations) {
-        let found: Vec<Vec<Hypothesis>> = (0..BATCHES_A_ROUND)
-            .into_par_iter()
-            .map(|batch| run_batch(&pairs, search, (round * BATCHES_A_ROUND + batch) as u64))
-            .collect();
-        for hypothesis in found.into_iter().flatten() {
-            insert(&mut best, hypothesis, search);
+impl Default for RansacConsensus {
+    fn default() -> Self {
+        Self {
+            max_iterations: 100_000,
+            confidence: 0.999,
+            edge_similarity: 0.9,
+            distance: 1.0,
+            keep: 4,
+            seed: 0,
         }
-        round += 1;
-        drawn += BATCH * BATCHES_A_ROUND;
-        if let Some(top) = best.first() {
-            let share = top.inliers as f64 / pairs.len() as f64;
-            // All three of a sample must be inliers.
-            let miss = (1.0 - share.powi(3)).max(1e-12);
-            if miss < 1.0 {
-                needed = ((1.0 - search.confidence).ln() / miss.ln()).ceil().max(1.0) as usize;
+    }
+}
+
+/// Source and target point of each match.
+type MatchedPoints = [([f64; 3], [f64; 3])];
+
+impl RansacConsensus {
+    /// The best poses, best first, and the number of samples drawn.
+    pub fn poses(&self, matches: &Correspondences) -> (Vec<SupportedPose>, usize) {
+        let pairs: Vec<_> = matches.source().iter().copied().zip(matches.target().iter().copied()).collect();
+        let mut best: Vec<SupportedPose> = Vec::new();
+        let mut drawn = 0;
+        if pairs.len() < 3 {
+            return (best, drawn);
+        }
+        let mut needed = self.max_iterations;
+        let mut round = 0;
+        while drawn < needed.min(self.max_iterations) {
+            let found: Vec<Vec<SupportedPose>> = (0..BATCHES_A_ROUND)
+                .into_par_iter()
+                .map(|batch| run_batch(&pairs, self, (round * BATCHES_A_ROUND + batch) as u64))
+                .collect();
+            for pose in found.into_iter().flatten() {
+                keep_diverse(&mut best, pose, self.keep.max(1), self.distance);
+            }
+            round += 1;
+            drawn += BATCH * BATCHES_A_ROUND;
+            if let Some(top) = best.first() {
+                let share = top.inliers as f64 / pairs.len() as f64;
+                // All three of a sample must be inliers.
+                let miss = (1.0 - share.powi(3)).max(1e-12);
+                if miss < 1.0 {
+                    needed = ((1.0 - self.confidence).ln() / miss.ln()).ceil().max(1.0) as usize;
+                }
             }
         }
+        for pose in &mut best {
+            *pose = polish(&pairs, *pose, self.distance);
+        }
+        best.sort_by(SupportedPose::by_support);
+        (best, drawn)
     }
-    for hypothesis in &mut best {
-        *hypothesis = polish(&pairs, *hypothesis, search.distance);
-    }
-    best.sort_by(|a, b| b.inliers.cmp(&a.inliers).then(a.squares.total_cmp(&b.squares)));
-    (best, drawn)
 }
 
-fn run_batch(pairs: &[([f64; 3], [f64; 3])], search: &ConsensusSearch, batch: u64) -> Vec<Hypothesis> {
+fn run_batch(pairs: &MatchedPoints, search: &RansacConsensus, batch: u64) -> Vec<SupportedPose> {
     let mut rng = ChaCha8Rng::seed_from_u64(search.seed);
     rng.set_stream(batch);
     let mut best = Vec::new();
     for _ in 0..BATCH {
         let sample: [usize; 3] = std::array::from_fn(|_| rng.random_range(0..pairs.len()));
         if let Some(pose) = fit_sample(pairs, sample, search) {
-            insert(&mut best, score(pairs, &pose, search.distance), search);
+            let pose = score(pairs, &pose, search.distance);
+            keep_diverse(&mut best, pose, search.keep.max(1), search.distance);
         }
     }
     best
 }
 
-fn fit_sample(pairs: &[([f64; 3], [f64; 3])], sample: [usize; 3], search: &ConsensusSearch) -> Option<Rigid> {
+fn fit_sample(pairs: &MatchedPoints, sample: [usize; 3], search: &RansacConsensus) -> Option<Rigid> {
     let [a, b, c] = sample;
     for (i, j) in [(a, b), (b, c), (c, a)] {
         let (in_source, in_target) = (squared(&pairs[i].0, &pairs[j].0), squared(&pairs[i].1, &pairs[j].1));
@@ -112,7 +117,7 @@ fn fit_sample(pairs: &[([f64; 3], [f64; 3])], sample: [usize; 3], search: &Conse
     sample.iter().all(|&i| squared(&pose.apply(&pairs[i].0), &pairs[i].1) <= limit).then_some(pose)
 }
 
-fn score(pairs: &[([f64; 3], [f64; 3])], pose: &Rigid, distance: f64) -> Hypothesis {
+fn score(pairs: &MatchedPoints, pose: &Rigid, distance: f64) -> SupportedPose {
     let limit = distance * distance;
     let (mut inliers, mut squares) = (0, 0.0);
     for (x, y) in pairs {
@@ -122,15 +127,18 @@ fn score(pairs: &[([f64; 3], [f64; 3])], pose: &Rigid, distance: f64) -> Hypothe
             squares += r;
         }
     }
-    Hypothesis { pose: *pose, inliers, squares }
+    SupportedPose { target_from_source: *pose, inliers, squares }
 }
 
 /// Fits to the inliers, twice, while that gains some (locally optimised RANSAC, Chum et al. 2003).
-fn polish(pairs: &[([f64; 3], [f64; 3])], mut best: Hypothesis, distance: f64) -> Hypothesis {
+fn polish(pairs: &MatchedPoints, mut best: SupportedPose, distance: f64) -> SupportedPose {
     for _ in 0..2 {
         let limit = distance * distance;
-        let (x, y): (Vec<_>, Vec<_>) =
-            pairs.iter().filter(|(x, y)| squared(&best.pose.apply(x), y) <= limit).copied().unzip();
+        let (x, y): (Vec<_>, Vec<_>) = pairs
+            .iter()
+            .filter(|(x, y)| squared(&best.target_from_source.apply(x), y) <= limit)
+            .copied()
+            .unzip();
         let Some(pose) = Rigid::fit(&x, &y, None) else { return best };
         let next = score(pairs, &pose, distance);
         if !next.beats(&best) {
@@ -141,77 +149,27 @@ fn polish(pairs: &[([f64; 3], [f64; 3])], mut best: Hypothesis, distance: f64) -
     best
 }
 
-/// Keeps the best hypotheses that differ by 10 degrees or 10 thresholds.
-fn insert(best: &mut Vec<Hypothesis>, new: Hypothesis, search: &ConsensusSearch) {
-    let alike = |a: &Hypothesis| {
-        a.pose.angle_to_deg(&new.pose) < 10.0
-            && (a.pose.translation - new.pose.translation).norm() < 10.0 * search.distance
-    };
-    if best.len() == search.keep && best.last().is_some_and(|last| !new.beats(last)) {
-        return;
-    }
-    if let Some(place) = best.iter().position(alike) {
-        if !new.beats(&best[place]) {
-            return;
-        }
-        best.remove(place);
-    }
-    let place = best.iter().position(|b| new.beats(b)).unwrap_or(best.len());
-    best.insert(place, new);
-    best.truncate(search.keep);
-}
-
-fn squared(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    (0..3).map(|c| (a[c] - b[c]) * (a[c] - b[c])).sum()
-}
-
 #[cfg(test)]
 mod tests {
-    use srrf_cloud::EulerXyz;
-
     use super::*;
-
-    /// `good` right matches and `bad` wrong ones.
-    fn matches(good: usize, bad: usize, truth: &Rigid) -> Correspondences {
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let mut point = || -> [f64; 3] { std::array::from_fn(|_| rng.random_range(-1.0..1.0)) };
-        let source: Vec<[f64; 3]> = (0..good + bad).map(|_| point()).collect();
-        let target =
-            source.iter().enumerate().map(|(i, p)| if i < good { truth.apply(p) } else { point() }).collect();
-        let pairs = (0..(good + bad) as u32).map(|i| (i, i)).collect();
-        Correspondences { source, target, voxel: 0.05, pairs }
-    }
-
-    fn search(seed: u64) -> ConsensusSearch {
-        ConsensusSearch {
-            max_iterations: 100_000,
-            confidence: 0.999,
-            edge_similarity: 0.9,
-            distance: 0.05,
-            keep: 4,
-            seed,
-        }
-    }
+    use crate::consensus::synthetic;
 
     #[test]
     fn finds_one_in_five_and_stops_early() {
-        let truth = Rigid {
-            rotation: EulerXyz::from_deg([100.0, -40.0, 20.0]).to_matrix(),
-            translation: [1.0, 2.0, -1.0].into(),
-        };
-        let (found, drawn) = ransac(&matches(60, 240, &truth), &search(3));
-        assert!(found[0].inliers >= 60 && found[0].pose.angle_to_deg(&truth) < 1.0);
+        let (matches, truth) = synthetic(300, 0.2, 0.0, 1);
+        let search = RansacConsensus { distance: 0.05, seed: 3, ..RansacConsensus::default() };
+        let (found, drawn) = search.poses(&matches);
+        assert!(found[0].inliers >= 60 && found[0].target_from_source.angle_to_deg(&truth) < 1.0);
         assert!(drawn < 100_000, "{drawn}");
         assert!(found.windows(2).all(|w| w[0].inliers >= w[1].inliers));
-        let (again, _) = ransac(&matches(60, 240, &truth), &search(3));
-        assert_eq!(found[0].pose, again[0].pose);
+        assert_eq!(found, search.poses(&matches).0);
     }
 
     #[test]
     fn too_few_matches_give_nothing() {
-        assert!(ransac(&matches(2, 0, &Rigid::identity()), &search(0)).0.is_empty());
-        let mut same = matches(5, 0, &Rigid::identity());
-        same.source = vec![[1.0; 3]; 5];
-        assert!(ransac(&same, &search(0)).0.is_empty());
+        let search = RansacConsensus { distance: 0.05, ..RansacConsensus::default() };
+        let matches = |n| Correspondences::new(vec![[1.0; 3]; n], vec![[2.0; 3]; n]).unwrap();
+        assert!(search.poses(&matches(2)).0.is_empty());
+        assert!(search.poses(&matches(5)).0.is_empty());
     }
 }

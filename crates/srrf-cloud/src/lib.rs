@@ -40,4 +40,6 @@ pub use rigid::Rigid;
 pub use solid::Solid;
 pub use triangles::Triangles;
 pub use unit::{LengthUnit, UnitError};
-pub use voxel::{VoxelError, coarsen, point_spacing, spacing_of, thin_to, voxel_downsample};
+pub use voxel::{
+    VoxelError, coarsen, point_spacing, spacing_of, thin_to, voxel_downsample, voxel_downsample_to,
+};

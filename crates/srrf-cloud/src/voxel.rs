@@ -1,12 +1,16 @@
 //! Thinning by a grid of voxels, and the spacing of a cloud.
 
-use nalgebra::Vector3;
-use rayon::prelude::*;
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 use crate::{CloudError, KnnIndex, PointCloud};
 
-/// Voxel indices up to here are exact in `f64`.
-const LARGEST_INDEX: f64 = 9.0e15;
+/// Most voxels along an axis: three such numbers make one key.
+const MOST_ALONG_AXIS: f64 = (1u64 << AXIS_BITS) as f64;
+/// Bits of a voxel's place along an axis.
+const AXIS_BITS: u32 = 42;
+/// Steps of a voxel's side in which points are summed. Sums of whole numbers do not depend on their order.
+const STEPS: f64 = (1u64 << 52) as f64;
 
 /// Clouds up to this size are measured at every point.
 const SPACING_SAMPLE: usize = 4096;
@@ -31,40 +35,96 @@ pub enum VoxelError {
 /// cloud), ordered by the voxel's place along x, then y, then z.
 ///
 /// The grid starts at the cloud's lowest corner, so that a shifted cloud gives shifted centroids.
-/// Sums are taken from that corner, which keeps the digits of clouds far from the origin, and in an
-/// order given by the coordinates, so that the answer does not depend on the order of the points.
+/// Sums are taken inside the voxels, which keeps the digits of clouds far from the origin, and in whole steps of `2^-52` sides,
+/// so that the answer does not depend on the order of the points.
 ///
 /// # Errors
 /// [`VoxelError`] for a size that is not above 0, or far too small for the cloud.
 pub fn voxel_downsample(cloud: &PointCloud, size: f64) -> Result<PointCloud, VoxelError> {
+    let thinned = voxel_downsample_to(cloud, size, usize::MAX)?;
+    // There are never more than so many.
+    Ok(thinned.unwrap_or_else(|| cloud.clone()))
+}
+
+/// As [`voxel_downsample`]; `None` as soon as more than `most` voxels hold points, which takes far less time than thinning.
+///
+/// # Errors
+/// As [`voxel_downsample`].
+pub fn voxel_downsample_to(
+    cloud: &PointCloud,
+    size: f64,
+    most: usize,
+) -> Result<Option<PointCloud>, VoxelError> {
     if !size.is_finite() || size <= 0.0 {
         return Err(VoxelError::Size(size));
     }
     let points = cloud.points();
     let low: [f64; 3] = std::array::from_fn(|c| points.iter().map(|p| p[c]).fold(f64::INFINITY, f64::min));
     let extent = points.iter().flat_map(|p| (0..3).map(|c| p[c] - low[c])).fold(0.0, f64::max);
-    if extent.is_nan() || extent / size > LARGEST_INDEX {
+    if extent.is_nan() || extent / size >= MOST_ALONG_AXIS {
         return Err(VoxelError::TooFine { size, extent });
     }
-    let mut keyed: Vec<([i64; 3], [f64; 3])> = points
-        .iter()
-        .map(|p| {
-            let local: [f64; 3] = std::array::from_fn(|c| p[c] - low[c]);
-            (local.map(|c| (c / size).floor() as i64), local)
+    let mut voxels: HashMap<u128, VoxelSum, BuildHasherDefault<KeyHasher>> = HashMap::default();
+    for p in points {
+        let place: [f64; 3] = std::array::from_fn(|c| (p[c] - low[c]) / size);
+        let whole = place.map(f64::floor);
+        let key = whole.iter().fold(0, |key, w| (key << AXIS_BITS) | *w as u128);
+        let voxel = voxels.entry(key).or_default();
+        for c in 0..3 {
+            voxel.steps[c] += i128::from(((place[c] - whole[c]) * STEPS) as i64);
+        }
+        voxel.count += 1;
+        if voxels.len() > most {
+            return Ok(None);
+        }
+    }
+    let mut voxels: Vec<(u128, VoxelSum)> = voxels.into_iter().collect();
+    voxels.sort_unstable_by_key(|(key, _)| *key);
+    let centroid = |(key, sum): &(u128, VoxelSum)| -> [f64; 3] {
+        std::array::from_fn(|c| {
+            let whole = (key >> (AXIS_BITS * (2 - c as u32))) & ((1 << AXIS_BITS) - 1);
+            let mean = sum.steps[c] as f64 / (f64::from(sum.count) * STEPS);
+            (whole as f64 + mean) * size + low[c]
         })
-        .collect();
-    keyed.par_sort_unstable_by(|(ka, a), (kb, b)| {
-        ka.cmp(kb).then(a[0].total_cmp(&b[0])).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]))
-    });
-    let centroids = keyed
-        .chunk_by(|a, b| a.0 == b.0)
-        .map(|voxel| {
-            let sum: Vector3<f64> = voxel.iter().map(|(_, p)| Vector3::from(*p)).sum();
-            (sum / voxel.len() as f64 + Vector3::from(low)).into()
-        })
-        .collect();
+    };
     // Means of finite points that lie within one voxel are finite, and there is at least one.
-    PointCloud::new(centroids).map_err(|_| VoxelError::TooFine { size, extent })
+    let centroids = PointCloud::new(voxels.iter().map(centroid).collect());
+    centroids.map(Some).map_err(|_| VoxelError::TooFine { size, extent })
+}
+
+/// The points of a voxel.
+#[derive(Debug, Clone, Copy, Default)]
+struct VoxelSum {
+    /// Sum of their places in the voxel, in [`STEPS`] of its side.
+    steps: [i128; 3],
+    count: u32,
+}
+
+/// Spreads the keys of voxels, which come from no adversary: neighbours differ in few bits.
+#[derive(Debug, Default)]
+struct KeyHasher(u64);
+
+impl Hasher for KeyHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|b| self.write_u64(u64::from(*b)));
+    }
+
+    fn write_u64(&mut self, value: u64) {
+        // A round of splitmix64 (Steele, Lea and Flood 2014).
+        let mixed = (self.0 ^ value).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        self.0 = mixed ^ (mixed >> 31);
+    }
+
+    fn write_u128(&mut self, value: u128) {
+        self.write_u64(value as u64);
+        self.write_u64((value >> 64) as u64);
+    }
 }
 
 /// The cloud itself if it has at most `most` points, or the centroids of the smallest voxels that leave no more; sizes grow
@@ -77,8 +137,8 @@ pub fn thin_to(cloud: &PointCloud, most: usize, radius: f64) -> PointCloud {
     }
     // A surface of this radius has about 4 pi (radius / size)^2 voxels.
     let first = radius * (4.0 / most as f64).sqrt();
-    let thin = |size| match voxel_downsample(cloud, size) {
-        Ok(thin) => Ok((thin.len() <= most).then_some(thin)),
+    let thin = |size| match voxel_downsample_to(cloud, size, most) {
+        Ok(thin) => Ok(thin),
         Err(VoxelError::TooFine { .. }) => Ok(None),
         Err(no_length) => Err(no_length),
     };
@@ -137,6 +197,8 @@ mod tests {
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
 
+    use nalgebra::Vector3;
+
     use super::*;
 
     fn cloud(n: usize) -> PointCloud {
@@ -160,6 +222,9 @@ mod tests {
         assert_eq!(thin, voxel_downsample(&reversed, 0.3).unwrap());
         assert!(thin.len() > 100 && thin.len() < 400);
         assert_eq!(voxel_downsample(&cloud, 50.0).unwrap().len(), 1);
+        let count = thin.len();
+        assert_eq!(voxel_downsample_to(&cloud, 0.3, count), Ok(Some(thin)));
+        assert_eq!(voxel_downsample_to(&cloud, 0.3, count - 1), Ok(None));
         let whole = voxel_downsample(&cloud, 50.0).unwrap().points()[0];
         assert!((Vector3::from(whole) - cloud.centroid()).norm() < 1e-12);
     }

@@ -46,15 +46,12 @@ pub(crate) fn nearest(
 ) -> (usize, Match) {
     match side {
         Side::Source => {
-            let moved = pose.apply(&source.points()[i]);
-            let (j, _) = target.index.nearest(&moved);
-            (j, Match { moved: moved.into(), fixed: target.points()[j].into(), normal: target.normals[j] })
+            let (j, _) = target.index.nearest(&pose.apply(&source.points()[i]));
+            (j, from_source(source, target, pose, i, j))
         }
         Side::Target => {
-            let fixed = target.points()[i];
-            let (j, _) = source.index.nearest(&inverse.apply(&fixed));
-            let moved = pose.apply(&source.points()[j]);
-            (j, Match { moved: moved.into(), fixed: fixed.into(), normal: pose.rotation * source.normals[j] })
+            let (j, _) = source.index.nearest(&inverse.apply(&target.points()[i]));
+            (j, from_target(source, target, pose, i, j))
         }
     }
 }
@@ -74,22 +71,43 @@ pub(crate) fn side_matches(
     parts.concat()
 }
 
-/// Normal equations over the matches of every `stride`-th point of both sides. `weigh` gives the
-/// metric `(a, b)` of a match, or `None` to leave it out.
+/// Which points of the other cloud the points of both sides are matched with, every `stride`-th point of a side.
+pub(crate) struct Partners {
+    pub stride: usize,
+    of_source: Vec<usize>,
+    of_target: Vec<usize>,
+}
+
+impl Partners {
+    /// Looks for the nearest points.
+    pub fn find(source: &CloudLevel, target: &CloudLevel, pose: &Rigid, stride: usize) -> Self {
+        let inverse = pose.inverse();
+        let [of_source, of_target] = [Side::Source, Side::Target].map(|side| {
+            let n = if side == Side::Source { source.points().len() } else { target.points().len() };
+            chunked(n.div_ceil(stride), |range| {
+                range.map(|i| nearest(source, target, pose, &inverse, side, i * stride).0).collect::<Vec<_>>()
+            })
+            .concat()
+        });
+        Self { stride, of_source, of_target }
+    }
+}
+
+/// Normal equations over these matches. `weigh` gives the metric `(a, b)` of a match, or `None` to leave it out.
 pub(crate) fn equations(
     source: &CloudLevel,
     target: &CloudLevel,
     pose: &Rigid,
-    stride: usize,
+    partners: &Partners,
     weigh: impl Fn(&Match) -> Option<(f64, f64)> + Sync,
 ) -> NormalEquations {
-    let inverse = pose.inverse();
+    let stride = partners.stride;
     let mut sums = NormalEquations::default();
-    for (side, n) in [(Side::Source, source.points().len()), (Side::Target, target.points().len())] {
-        let parts = chunked(n.div_ceil(stride), |range| {
+    let mut add_all = |n: usize, found: &(dyn Fn(usize) -> Match + Sync)| {
+        let parts = chunked(n, |range| {
             let mut part = NormalEquations::default();
             for i in range {
-                let (_, found) = nearest(source, target, pose, &inverse, side, i * stride);
+                let found = found(i);
                 if let Some((a, b)) = weigh(&found) {
                     part.add(&found, a, b);
                 }
@@ -97,8 +115,26 @@ pub(crate) fn equations(
             part
         });
         parts.iter().for_each(|part| sums.merge(part));
-    }
+    };
+    add_all(partners.of_source.len(), &|i| {
+        from_source(source, target, pose, i * stride, partners.of_source[i])
+    });
+    add_all(partners.of_target.len(), &|i| {
+        from_target(source, target, pose, i * stride, partners.of_target[i])
+    });
     sums
+}
+
+/// The match of source point `i` with target point `j`.
+fn from_source(source: &CloudLevel, target: &CloudLevel, pose: &Rigid, i: usize, j: usize) -> Match {
+    let moved = pose.apply(&source.points()[i]).into();
+    Match { moved, fixed: target.points()[j].into(), normal: target.normals[j] }
+}
+
+/// The match of target point `i` with source point `j`.
+fn from_target(source: &CloudLevel, target: &CloudLevel, pose: &Rigid, i: usize, j: usize) -> Match {
+    let moved = pose.apply(&source.points()[j]).into();
+    Match { moved, fixed: target.points()[i].into(), normal: pose.rotation * source.normals[j] }
 }
 
 /// The matches of both sides, source first, as [`side_matches`] gives them.

@@ -8,11 +8,14 @@ use crate::affine::{AffineFit, affine_fit};
 use crate::deformation::{ResidualStructure, residual_structure};
 use crate::evidence::{Evidence, evidence};
 use crate::matching::{BothSides, both_sides, plane_support, support};
-use crate::prepared::RefineCloud;
+use crate::prepared::{CloudLevel, RefineCloud};
 use crate::robust::{Descent, ScaleSchedule, descend};
 use crate::soft::soft;
 use crate::verdict::{self, Verdict};
 use crate::{Deformed, Metric, Ranking, RefineConfig, RefineError};
+
+/// Points of each cloud that a first look at a start asks.
+const GLANCE_POINTS: usize = 400;
 
 /// A start after its short run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -89,6 +92,21 @@ impl RefineRun<'_> {
             [only] => vec![run(only, false)],
             several => several.par_iter().map(|start| run(start, true)).collect(),
         }
+    }
+
+    /// How much a start brings together as it is, in [0, 1]: the mean over some points of both clouds of `s^2 / (s^2 + r^2)`, for
+    /// `s` of two point spacings, since a start is not exact.
+    pub fn glance(&self, start: &Rigid) -> f64 {
+        let (s, t) = (self.source.coarse(), self.target.coarse());
+        let scale = 2.0 * s.spacing.max(t.spacing);
+        let stride = s.points().len().max(t.points().len()).div_ceil(GLANCE_POINTS);
+        let pose = self.local(start);
+        let inverse = pose.inverse();
+        let mean = |points: &[[f64; 3]], other: &CloudLevel, pose: &Rigid| {
+            let near = |p: &[f64; 3]| scale * scale / (scale * scale + other.index.nearest(&pose.apply(p)).1);
+            points.iter().step_by(stride).map(near).sum::<f64>() / points.len().div_ceil(stride) as f64
+        };
+        0.5 * (mean(s.points(), t, &pose) + mean(t.points(), s, &inverse))
     }
 
     /// The full run of the best of `starts`, and what to make of it.
@@ -212,11 +230,18 @@ impl RefineRun<'_> {
         let config = self.config;
         let two_levels = self.source.has_coarse() || self.target.has_coarse();
         let (s, t) = (self.source.coarse(), self.target.coarse());
-        let schedule = ScaleSchedule::new(s, t, start, self.target.radius, config);
+        let mut schedule = ScaleSchedule::new(s, t, start, self.target.radius, config);
+        if two_levels {
+            schedule = schedule.loosened(s.spacing.max(t.spacing), 0.05, 0.01);
+        }
         let mut stage = self.descend_on(false, start, &schedule, config.metric);
         if two_levels {
             let (s, t) = (self.source.fine(), self.target.fine());
-            let schedule = ScaleSchedule::new(s, t, &stage.pose, self.target.radius, config);
+            let schedule = ScaleSchedule {
+                first_stride: s.points().len().max(t.points().len()).div_ceil(4096),
+                ..ScaleSchedule::new(s, t, &stage.pose, self.target.radius, config)
+            }
+            .loosened(s.spacing.max(t.spacing), 0.01, 5e-4);
             stage = after(stage, self.descend_on(true, &stage.pose, &schedule, config.metric));
         }
         let (s, t) = (self.source.fine(), self.target.fine());
@@ -240,7 +265,7 @@ impl RefineRun<'_> {
         } else {
             (self.source.coarse(), self.target.coarse())
         };
-        descend(s, t, start, self.target.radius, metric, schedule, self.config.tolerance)
+        descend(s, t, start, self.target.radius, metric, schedule)
     }
 }
 

@@ -1,5 +1,6 @@
 //! [`RefineTarget`] and [`RefineSource`]: clouds made ready, and [`refine`] for one pair.
 
+use rayon::prelude::*;
 use srrf_cloud::{PointCloud, Rigid, Solid};
 
 use crate::evidence::{Evidence, evidence};
@@ -70,11 +71,29 @@ impl RefineTarget {
         source: &RefineSource,
         starts: &[Rigid],
     ) -> Result<Vec<StartSupport>, RefineError> {
-        let finite = |p: &Rigid| p.rotation.iter().chain(p.translation.iter()).all(|v| v.is_finite());
-        match starts.iter().position(|pose| !finite(pose)) {
-            Some(number) => Err(RefineError::Start(number)),
-            None => Ok(self.run(source).shortlist(starts)),
-        }
+        all_finite(starts)?;
+        Ok(self.run(source).shortlist(starts))
+    }
+
+    /// Numbers of the `most` starts that bring most of both clouds together as they are, at a first look at few points; in their
+    /// order, all where there are no more. It is far cheaper than a short run.
+    ///
+    /// # Errors
+    /// [`RefineError::Start`] for a start that is not finite.
+    pub fn screen(
+        &self,
+        source: &RefineSource,
+        starts: &[Rigid],
+        most: usize,
+    ) -> Result<Vec<usize>, RefineError> {
+        all_finite(starts)?;
+        let run = self.run(source);
+        let scores: Vec<f64> = starts.par_iter().map(|start| run.glance(start)).collect();
+        let mut best: Vec<usize> = (0..starts.len()).collect();
+        best.sort_by(|a, b| scores[*b].total_cmp(&scores[*a]));
+        best.truncate(most);
+        best.sort_unstable();
+        Ok(best)
     }
 
     /// The second half of [`RefineTarget::refine`]: the full run of the best of the shortlist.
@@ -87,6 +106,14 @@ impl RefineTarget {
 
     fn run<'a>(&'a self, source: &'a RefineSource) -> RefineRun<'a> {
         RefineRun { source: &source.prepared, target: &self.prepared, config: &self.config }
+    }
+}
+
+fn all_finite(starts: &[Rigid]) -> Result<(), RefineError> {
+    let finite = |p: &Rigid| p.rotation.iter().chain(p.translation.iter()).all(|v| v.is_finite());
+    match starts.iter().position(|pose| !finite(pose)) {
+        Some(number) => Err(RefineError::Start(number)),
+        None => Ok(()),
     }
 }
 

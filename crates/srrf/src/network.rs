@@ -1,5 +1,7 @@
 //! The network as a source of starts.
 
+use std::sync::OnceLock;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 use srrf_cloud::{PointCloud, Register, RegisterError, Registration, Rigid, thin_to};
@@ -7,6 +9,7 @@ use srrf_model::weights::LoadedModel;
 use srrf_model::{SrrfRegister, embedded};
 
 use crate::error::Error;
+use crate::options::DEFAULT_DEVICE;
 
 /// Points of the cloud that the network chooses its 1,024 from: enough to look evenly over a scan.
 const THINNED: usize = 8192;
@@ -68,6 +71,39 @@ impl Network {
         start: &Rigid,
     ) -> Result<Registration, RegisterError> {
         Ok(self.glance.register(&source.transformed(start), target)?.after(start))
+    }
+}
+
+/// A network that is loaded when it is first asked: many pairs never ask.
+#[derive(Debug)]
+pub struct LazyNetwork {
+    weights: Option<String>,
+    device: String,
+    loaded: OnceLock<Result<Network, String>>,
+}
+
+impl LazyNetwork {
+    /// Weights that a user names, and devices other than the default, are tried at once: their faults belong to the start.
+    ///
+    /// # Errors
+    /// As [`Network::load`].
+    pub fn new(weights: Option<&str>, device: &str) -> Result<Self, Error> {
+        let lazy =
+            Self { weights: weights.map(str::to_owned), device: device.to_owned(), loaded: OnceLock::new() };
+        if weights.is_some() || device != DEFAULT_DEVICE {
+            let network = Network::load(weights, device)?;
+            lazy.loaded.get_or_init(|| Ok(network));
+        }
+        Ok(lazy)
+    }
+
+    /// The network.
+    ///
+    /// # Errors
+    /// [`RegisterError::NoPose`] where it cannot be loaded.
+    pub fn get(&self) -> Result<&Network, RegisterError> {
+        let load = || Network::load(self.weights.as_deref(), &self.device).map_err(|e| e.to_string());
+        self.loaded.get_or_init(load).as_ref().map_err(|why| RegisterError::NoPose(why.clone()))
     }
 }
 

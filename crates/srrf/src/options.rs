@@ -8,6 +8,9 @@ use srrf_refine::{Deformed, Ranking, RefineConfig};
 
 use crate::probability::Probability;
 
+/// The device that every build has.
+pub(crate) const DEFAULT_DEVICE: &str = "flex";
+
 /// How starts for the refinement are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -129,7 +132,7 @@ impl Default for Options {
                 ..RefineConfig::default()
             }),
             weights: None,
-            device: "flex".to_owned(),
+            device: DEFAULT_DEVICE.to_owned(),
             seed: 0,
             check_scale: true,
             abstain_below: Probability::HALF,

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use srrf_cloud::{PointCloud, Rigid, Solid};
+use srrf_cloud::{PointCloud, Solid};
 
 use crate::clock::StageClock;
 use crate::error::Error;
 use crate::event::Event;
 use crate::judge::{Judge, Judgement};
-use crate::network::Network;
+use crate::network::LazyNetwork;
 use crate::options::{Method, Options};
 use crate::outcome::{Outcome, PointCounts};
 use crate::proposals::{Proposals, Round, rounds};
@@ -18,11 +18,14 @@ use crate::stage::{Stage, StageTime};
 use crate::target::{PreparedPair, Target};
 use crate::warning::Warning;
 
-/// Registers pairs with one set of options; holds the network. Share it between threads.
+/// With so much probability, an answer that two estimators agree on is left as it is: of such, wider searches hardly change one.
+const FAIR: f64 = 0.65;
+
+/// Registers pairs with one set of options; holds the network, loaded when first asked. Share it between threads.
 #[derive(Debug)]
 pub struct Registrar {
     options: Options,
-    network: Option<Arc<Network>>,
+    network: Option<Arc<LazyNetwork>>,
     /// Where starts come from, round by round.
     rounds: Vec<(Round, Vec<Box<dyn Proposals>>)>,
     judge: Judge,
@@ -39,7 +42,7 @@ impl Registrar {
         }
         let network = match options.method {
             Method::Auto | Method::Srrf => {
-                Some(Arc::new(Network::load(options.weights.as_deref(), &options.device)?))
+                Some(Arc::new(LazyNetwork::new(options.weights.as_deref(), &options.device)?))
             }
             Method::FpfhRansac | Method::Icp | Method::Given => None,
         };
@@ -63,8 +66,9 @@ impl Registrar {
 
     /// Lays the source of a request on its target: `target ~ R source + t`.
     ///
-    /// Starts come in rounds, the cheap ones first. Each round is ranked, its best start refined and judged, and the first answer
-    /// that is sure ends the search.
+    /// Starts come in rounds, the cheapest evidence first: a first guess that was given, features, the network, wide searches. Each
+    /// round is ranked, its best start refined and judged, and the first answer that is sure, or that two estimators agree on, ends
+    /// the search.
     ///
     /// # Errors
     /// [`Error`] for clouds that determine no rotation, for clouds that seem to be in different units of length
@@ -72,7 +76,7 @@ impl Registrar {
     pub fn register(&self, request: &Request<'_>) -> Result<Outcome, Error> {
         let (pair, clock) = self.prepare_pair(request)?;
         let tried = if self.options.check_scale { self.doubt_scale(request, &pair)? } else { None };
-        let mut outcome = self.rounds(request, &pair, clock, self.rounds.len())?;
+        let mut outcome = self.rounds(request, &pair, clock, Round::AllAround)?;
         if let Some(tried) = tried
             && tried.is_told(outcome.abstain)
         {
@@ -85,37 +89,43 @@ impl Registrar {
     /// As [`register`](Self::register), without a question about the scale.
     pub(crate) fn register_as_it_is(&self, request: &Request<'_>) -> Result<Outcome, Error> {
         let (pair, clock) = self.prepare_pair(request)?;
-        self.rounds(request, &pair, clock, self.rounds.len())
+        self.rounds(request, &pair, clock, Round::AllAround)
     }
 
-    /// What the first round finds.
+    /// What the cheap sources find.
     pub(crate) fn first_round(&self, request: &Request<'_>) -> Result<Outcome, Error> {
         let (pair, clock) = self.prepare_pair(request)?;
-        self.rounds(request, &pair, clock, 1)
+        self.rounds(request, &pair, clock, Round::Cheap)
     }
 
-    /// At most so many rounds.
+    /// The rounds up to `last`.
     fn rounds(
         &self,
         request: &Request<'_>,
         pair: &PreparedPair,
         clock: StageClock<'_>,
-        most: usize,
+        last: Round,
     ) -> Result<Outcome, Error> {
         let mut search = Search::new(pair, self.options.refine.is_some(), clock);
         let mut answer = None;
-        for (number, (round, sources)) in (1..).zip(&self.rounds).take(most) {
+        for (number, (round, sources)) in (1..).zip(&self.rounds) {
+            if *round > last {
+                break;
+            }
             if request.is_stopped() {
                 return Err(Error::Stopped);
             }
             request.observed.tell(Event::Round { number, of: self.rounds.len() });
-            search.propose(sources).map_err(Error::Refine)?;
+            if !search.propose(*round, sources).map_err(Error::Refine)? {
+                continue;
+            }
             let Some(best) = search.best(round.refining()).map_err(Error::Refine)? else { continue };
             let judgement = self.judge.judge(&best.features);
+            let corroborated = search.is_corroborated(&best);
             answer = Some((best, judgement));
             let (probability, sure) = (judgement.probability, judgement.is_sure());
             request.observed.tell(Event::Judged { round: number, probability, sure });
-            if sure {
+            if sure || *round >= Round::Graph && probability.get() >= FAIR && corroborated {
                 break;
             }
         }
@@ -137,14 +147,16 @@ impl Registrar {
         request.observed.tell(Event::Ended(prepared));
         let mut clock = StageClock::after(vec![prepared], request.observed);
         clock.begin(Stage::PrepareSource);
-        let initial = request.initial.unwrap_or_else(Rigid::identity);
-        let pair = PreparedPair::new(request.source, target, &initial, &self.options)?;
+        let pair = PreparedPair::new(request.source, target, request.initial.as_ref(), &self.options)?;
         clock.lap(Stage::PrepareSource);
         Ok((pair, clock))
     }
 
     fn outcome(&self, pair: &PreparedPair, search: Search<'_>, best: Best, judgement: Judgement) -> Outcome {
         let mut learned = search.finish();
+        let asked = |t: &StageTime| matches!(t.stage, Stage::Network | Stage::NetworkAllAround);
+        let network = self.network.as_ref().filter(|_| learned.times.iter().any(asked));
+        let weights = network.and_then(|network| Some(network.get().ok()?.weights.clone()));
         let Judgement { probability, abstain } = judgement;
         learned.warnings.extend(abstain.then_some(Warning::Doubtful { probability }));
         Outcome {
@@ -159,13 +171,10 @@ impl Registrar {
             refinement: best.refinement,
             evidence: best.evidence,
             features: best.features,
-            points: PointCounts {
-                source: pair.source.centred.cloud().len(),
-                target: pair.target_side().centred.cloud().len(),
-            },
+            points: PointCounts { source: pair.source.count, target: pair.target_side().count },
             times: learned.times,
             seed: self.options.seed,
-            weights: self.network.as_ref().map(|network| network.weights.clone()),
+            weights,
             warnings: learned.warnings,
         }
     }

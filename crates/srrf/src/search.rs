@@ -8,11 +8,21 @@ use crate::coarse::CoarsePose;
 use crate::error::NoPose;
 use crate::features::Features;
 use crate::outcome::TriedStart;
-use crate::proposals::{Proposal, Proposals, Proposed};
+use crate::proposals::{Proposal, Proposals, Proposed, Round};
 use crate::stage::{Stage, StageTime};
 use crate::start::Start;
 use crate::target::PreparedPair;
 use crate::warning::Warning;
+
+/// Of a round with more than twice so many starts, so many get a short run.
+const SHORTLIST: usize = 16;
+
+/// Poses of two sources that differ by less, and by less than this share of the target's radius, are one.
+const ALIKE_DEG: f64 = 5.0;
+const ALIKE: f64 = 0.05;
+/// A start that is so near the end of another's full run would end there too.
+const SAME_DEG: f64 = 1.0;
+const SAME: f64 = 0.01;
 
 /// What the starts so far came to.
 #[derive(Debug, Clone)]
@@ -43,7 +53,7 @@ pub(crate) struct Search<'a> {
     starts: Vec<Start>,
     /// One for each of `starts`.
     supports: Vec<StartSupport>,
-    /// Less likely starts, for the next round.
+    /// Less likely starts, for the wide round.
     spare: Vec<Proposal>,
     /// Full runs so far, each after the number of its start; that of the first round comes first.
     refined: Vec<(usize, Refinement)>,
@@ -67,10 +77,12 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// One more round: what was spare in the one before, and what these sources find.
-    pub fn propose(&mut self, sources: &[Box<dyn Proposals>]) -> Result<(), RefineError> {
-        let mut proposals = std::mem::take(&mut self.spare);
-        for source in sources {
+    /// One more round: what these sources find, and in the wide round what was spare before. Whether there was anything to ask.
+    pub fn propose(&mut self, round: Round, sources: &[Box<dyn Proposals>]) -> Result<bool, RefineError> {
+        let mut proposals = if round == Round::Wide { std::mem::take(&mut self.spare) } else { Vec::new() };
+        let mut asked = !proposals.is_empty();
+        for source in sources.iter().filter(|source| source.is_for(self.pair)) {
+            asked = true;
             if let Some(stage) = source.stage() {
                 self.clock.begin(stage);
             }
@@ -83,12 +95,20 @@ impl<'a> Search<'a> {
                 self.clock.lap(stage);
             }
         }
-        self.add(&proposals)
+        self.add(&proposals)?;
+        Ok(asked)
     }
 
-    /// Ranks more starts.
+    /// Ranks more starts: of many, those that a first look leaves.
     fn add(&mut self, proposals: &[Proposal]) -> Result<(), RefineError> {
         let (target, source) = (&self.pair.target.0.refine, &self.pair.refine);
+        let all: Vec<Rigid> = proposals.iter().map(|p| p.pose).collect();
+        let kept = if self.refine && !self.pair.is_small() && all.len() > 2 * SHORTLIST {
+            target.screen(source, &all, SHORTLIST)?
+        } else {
+            (0..all.len()).collect()
+        };
+        let proposals: Vec<Proposal> = kept.into_iter().map(|i| proposals[i]).collect();
         let poses: Vec<Rigid> = proposals.iter().map(|p| p.pose).collect();
         // A shortlist of one moves nothing.
         let together = if self.refine { poses.len().max(1) } else { 1 };
@@ -121,7 +141,13 @@ impl<'a> Search<'a> {
     }
 
     fn refined(&mut self, best: usize) -> Result<Best, RefineError> {
-        let run = match self.refined.iter().position(|(start, _)| *start == best) {
+        let known = self.refined.iter().position(|(start, _)| *start == best).or_else(|| {
+            // Of another start on its way to the same pose, the full run would end there too.
+            let pose = &self.supports[best].target_from_source;
+            let there = |run: &Refinement| self.alike(&run.target_from_source, pose, SAME_DEG, SAME);
+            self.refined.iter().position(|(_, run)| !self.pair.is_small() && there(run))
+        });
+        let run = match known {
             Some(run) => run,
             None => {
                 self.refined.push((best, self.target().finish(&self.pair.refine, &self.supports)?));
@@ -136,6 +162,24 @@ impl<'a> Search<'a> {
         let rank = self.supports[*from].rank;
         let features = Features::new(&evidence, Some(&refined), &pose, rank, &self.rivals());
         Ok(Best { pose, start, refinement: Some(refined), evidence, features })
+    }
+
+    /// Whether the graph of all matches and another source found this pose, each on its own. Small pairs, where every start is cheap,
+    /// need more.
+    pub fn is_corroborated(&self, best: &Best) -> bool {
+        let near = |s: &StartSupport| self.alike(&s.target_from_source, &best.pose, ALIKE_DEG, ALIKE);
+        let found = |by: fn(&Start) -> bool| {
+            self.starts.iter().zip(&self.supports).any(|(start, s)| by(start) && near(s))
+        };
+        !self.pair.is_small()
+            && found(|start| matches!(start, Start::FpfhGraph { .. }))
+            && found(|start| matches!(start, Start::FpfhRansac { .. } | Start::NetworkFused))
+    }
+
+    /// Whether poses differ by less than an angle, and by less than a share of the target's radius.
+    fn alike(&self, a: &Rigid, b: &Rigid, degrees: f64, share: f64) -> bool {
+        let reach = share * self.pair.target_side().radius;
+        a.angle_to_deg(b) < degrees && (a.translation - b.translation).norm() < reach
     }
 
     fn target(&self) -> &'a RefineTarget {
@@ -184,7 +228,7 @@ mod tests {
             synthesizer.pair(&shapes, 1, corruption, PoseDraw::Seeded, Stream { seed: 5, item: 1 }).unwrap();
         let options = Options::default();
         let target = Target::new(&pair.target, &options).unwrap();
-        let pair = PreparedPair::new(&pair.source, target, &pair.target_from_source, &options).unwrap();
+        let pair = PreparedPair::new(&pair.source, target, Some(&pair.target_from_source), &options).unwrap();
         let off = |start, degrees: [f64; 3]| {
             let by = Rigid { rotation: EulerXyz::from_deg(degrees).to_matrix(), ..Rigid::identity() };
             Proposal { start, pose: by.compose(&pair.initial) }

@@ -17,10 +17,20 @@ pub enum Stage {
     Network,
     /// FPFH with RANSAC.
     FpfhRansac,
+    /// The compatibility graph of FPFH matches.
+    FpfhGraph,
+    /// The same with more points.
+    FpfhGraphFiner,
+    /// Ranking and refining after the graph.
+    RefineGraph,
     /// Iterative closest point.
     Icp,
-    /// Ranking the starts and refining the best.
+    /// Ranking the starts and refining the best, the first time.
     Refine,
+    /// Ranking and refining after the features, where a first guess left doubt.
+    RefineGlobal,
+    /// Ranking and refining after the network.
+    RefineNetwork,
     /// FPFH with RANSAC, wider features.
     FpfhRansacWider,
     /// Ranking and refining after those.
@@ -41,8 +51,13 @@ impl fmt::Display for Stage {
             Self::PrepareSource => "prepare source",
             Self::Network => "network",
             Self::FpfhRansac => "fpfh-ransac",
+            Self::FpfhGraph => "fpfh-graph",
+            Self::FpfhGraphFiner => "fpfh-graph, finer",
+            Self::RefineGraph => "refine, graph",
             Self::Icp => "icp",
             Self::Refine => "refine",
+            Self::RefineGlobal => "refine, global",
+            Self::RefineNetwork => "refine, network",
             Self::FpfhRansacWider => "fpfh-ransac, wider",
             Self::RefineWider => "refine, wider",
             Self::NetworkAllAround => "network, 23 orientations",

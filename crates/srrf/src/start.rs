@@ -21,6 +21,11 @@ pub enum Start {
         /// Radius of the features, in voxels.
         feature_voxels: f64,
     },
+    /// The compatibility graph of FPFH matches.
+    FpfhGraph {
+        /// Radius of the features, in voxels.
+        feature_voxels: f64,
+    },
     /// Iterative closest point from the first guess.
     Icp,
     /// The first guess itself.
@@ -34,7 +39,7 @@ impl Start {
     pub fn method(self) -> Method {
         match self {
             Self::NetworkFused | Self::NetworkBranch(_) | Self::Orientation(_) => Method::Srrf,
-            Self::FpfhRansac { .. } => Method::FpfhRansac,
+            Self::FpfhRansac { .. } | Self::FpfhGraph { .. } => Method::FpfhRansac,
             Self::Icp => Method::Icp,
             Self::Given => Method::Given,
             Self::Own(_) => Method::Auto,
@@ -49,6 +54,7 @@ impl fmt::Display for Start {
             Self::NetworkBranch(name) => write!(f, "network {name}"),
             Self::Orientation(number) => write!(f, "network, orientation {number}"),
             Self::FpfhRansac { .. } => f.write_str("fpfh-ransac"),
+            Self::FpfhGraph { .. } => f.write_str("fpfh-graph"),
             Self::Icp => f.write_str("icp"),
             Self::Given => f.write_str("given"),
             Self::Own(name) => f.write_str(name),
@@ -74,6 +80,7 @@ mod tests {
             (Start::NetworkBranch(BranchKind::Skeleton), "network skeleton"),
             (Start::Orientation(7), "network, orientation 7"),
             (Start::FpfhRansac { feature_voxels: 8.0 }, "fpfh-ransac"),
+            (Start::FpfhGraph { feature_voxels: 5.0 }, "fpfh-graph"),
             (Start::Icp, "icp"),
             (Start::Given, "given"),
             (Start::Own("compass"), "compass"),

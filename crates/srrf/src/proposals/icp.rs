@@ -6,7 +6,7 @@ use srrf_classical::{Icp, IcpConfig};
 use srrf_cloud::Register;
 
 use super::{Proposal, Proposals, Proposed, Round};
-use crate::network::Network;
+use crate::network::LazyNetwork;
 use crate::options::{Method, Options};
 use crate::stage::Stage;
 use crate::start::Start;
@@ -17,7 +17,10 @@ use crate::warning::Warning;
 #[derive(Debug)]
 struct IcpFromFirstGuess;
 
-pub(super) fn from_first_guess(options: &Options, _: Option<&Arc<Network>>) -> Option<Box<dyn Proposals>> {
+pub(super) fn from_first_guess(
+    options: &Options,
+    _: Option<&Arc<LazyNetwork>>,
+) -> Option<Box<dyn Proposals>> {
     (options.method == Method::Icp).then(|| Box::new(IcpFromFirstGuess) as _)
 }
 

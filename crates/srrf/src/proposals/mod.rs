@@ -14,7 +14,7 @@ use std::sync::Arc;
 use srrf_cloud::Rigid;
 
 use crate::coarse::CoarsePose;
-use crate::network::Network;
+use crate::network::LazyNetwork;
 use crate::options::Options;
 use crate::stage::Stage;
 use crate::start::Start;
@@ -23,21 +23,30 @@ use crate::warning::Warning;
 
 /// All sources, each where its options ask for it; those of one round in this order.
 const SOURCES: &[Make] = &[
-    network::from_first_guess,
+    given::guided,
+    network::at_once,
     global::narrow,
     icp::from_first_guess,
     given::first_guess,
+    network::from_first_guess,
+    global::graph,
     global::wide,
+    global::fine,
     network::all_around,
 ];
 
 /// Makes a source, where the options ask for it.
-type Make = fn(&Options, Option<&Arc<Network>>) -> Option<Box<dyn Proposals>>;
+type Make = fn(&Options, Option<&Arc<LazyNetwork>>) -> Option<Box<dyn Proposals>>;
 
 /// A source of starts.
 pub(crate) trait Proposals: fmt::Debug + Send + Sync {
     /// When it is asked.
     fn round(&self) -> Round;
+
+    /// Whether it is asked for such a pair.
+    fn is_for(&self, _: &PreparedPair) -> bool {
+        true
+    }
 
     /// What its time is reported as; none for what takes no time.
     fn stage(&self) -> Option<Stage>;
@@ -47,23 +56,33 @@ pub(crate) trait Proposals: fmt::Debug + Send + Sync {
 }
 
 /// A round of starts. Each later one is made only where those before it leave doubt.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Round {
+    /// The first guess that was given.
+    Guided,
     /// What is found fast.
     Cheap,
+    /// The compatibility graph of matches.
+    Graph,
+    /// The network from the first guess.
+    Network,
     /// Less likely poses, and wider features.
     Wide,
-    /// The network from all around.
+    /// The network from all around; for large clouds, many more points.
     AllAround,
 }
 
 impl Round {
-    const ALL: [Self; 3] = [Self::Cheap, Self::Wide, Self::AllAround];
+    const ALL: [Self; 6] =
+        [Self::Guided, Self::Cheap, Self::Graph, Self::Network, Self::Wide, Self::AllAround];
 
-    /// What the time of ranking and refining after this round is reported as.
+    /// What the time of ranking and refining after this round is reported as, where it is not the first.
     pub fn refining(self) -> Stage {
         match self {
-            Self::Cheap => Stage::Refine,
+            Self::Guided => Stage::Refine,
+            Self::Cheap => Stage::RefineGlobal,
+            Self::Graph => Stage::RefineGraph,
+            Self::Network => Stage::RefineNetwork,
             Self::Wide => Stage::RefineWider,
             Self::AllAround => Stage::RefineAgain,
         }
@@ -73,7 +92,7 @@ impl Round {
 /// The sources of each round that has any, in the order of the rounds.
 pub(crate) fn rounds(
     options: &Options,
-    network: Option<&Arc<Network>>,
+    network: Option<&Arc<LazyNetwork>>,
 ) -> Vec<(Round, Vec<Box<dyn Proposals>>)> {
     let mut sources: Vec<Box<dyn Proposals>> =
         SOURCES.iter().filter_map(|make| make(options, network)).collect();
@@ -122,19 +141,30 @@ mod tests {
 
     #[test]
     fn each_method_has_its_rounds() {
-        let network = Arc::new(Network::load(None, "flex").unwrap());
+        let network = Arc::new(LazyNetwork::new(None, "flex").unwrap());
         let stages = |method, rotation, network| -> Vec<Vec<Option<Stage>>> {
             let options = Options { method, rotation, ..Options::default() };
             let rounds = rounds(&options, network);
             rounds.iter().map(|(_, sources)| sources.iter().map(|s| s.stage()).collect()).collect()
         };
         let cheap = vec![Some(Stage::Network), Some(Stage::FpfhRansac), None];
+        let (guided, later) = (vec![None], vec![Some(Stage::Network)]);
         let (wide, around) = (vec![Some(Stage::FpfhRansacWider)], vec![Some(Stage::NetworkAllAround)]);
         let (any, within) = (RotationRange::Any, RotationRange::Within45);
-        assert_eq!(stages(Method::Auto, any, Some(&network)), [cheap.clone(), wide.clone(), around.clone()]);
-        assert_eq!(stages(Method::Auto, within, Some(&network)), [cheap, wide.clone()]);
-        assert_eq!(stages(Method::Srrf, any, Some(&network)), [vec![Some(Stage::Network)], around]);
-        assert_eq!(stages(Method::FpfhRansac, any, None), [vec![Some(Stage::FpfhRansac)], wide]);
+        let (graph, fine) = (vec![Some(Stage::FpfhGraph)], Some(Stage::FpfhGraphFiner));
+        let around = [vec![fine], around].concat();
+        let auto = [guided, cheap, graph.clone(), later, wide.clone(), around.clone()];
+        assert_eq!(stages(Method::Auto, any, Some(&network)), auto);
+        let within = stages(Method::Auto, within, Some(&network));
+        assert_eq!((&within[..5], &within[5]), (&auto[..5], &vec![fine]));
+        assert_eq!(
+            stages(Method::Srrf, any, Some(&network)),
+            [vec![Some(Stage::Network)], vec![Some(Stage::NetworkAllAround)]]
+        );
+        assert_eq!(
+            stages(Method::FpfhRansac, any, None),
+            [vec![Some(Stage::FpfhRansac)], graph, wide, vec![fine]]
+        );
         assert_eq!(stages(Method::Icp, any, None), [vec![Some(Stage::Icp)]]);
         assert_eq!(stages(Method::Given, any, None), [vec![None]]);
     }

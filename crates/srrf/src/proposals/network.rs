@@ -8,7 +8,7 @@ use srrf_cloud::{Registration, Rigid};
 
 use super::{Proposal, Proposals, Proposed, Round};
 use crate::coarse::CoarsePose;
-use crate::network::Network;
+use crate::network::{LazyNetwork, Network};
 use crate::options::{Method, Options, RotationRange};
 use crate::stage::Stage;
 use crate::start::Start;
@@ -17,24 +17,62 @@ use crate::warning::Warning;
 
 /// The fused pose and those of the branches, of one look from the first guess.
 #[derive(Debug)]
-struct NetworkFromFirstGuess(Arc<Network>);
+struct NetworkFromFirstGuess {
+    network: Arc<LazyNetwork>,
+    round: Round,
+    /// Which pairs it is for.
+    pairs: AskedFor,
+}
+
+/// Which pairs a look is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum AskedFor {
+    All,
+    /// Of the size that the network was trained for.
+    Small,
+    /// Larger ones that it sees whole: there, features are cheaper and more often right. Of scans it sees too little.
+    Medium,
+}
 
 /// The fused poses of a glance from each of the other 23 orientations of a cube.
 #[derive(Debug)]
-struct AllAround(Arc<Network>);
+struct AllAround(Arc<LazyNetwork>);
 
-pub(super) fn from_first_guess(_: &Options, network: Option<&Arc<Network>>) -> Option<Box<dyn Proposals>> {
-    network.map(|network| Box::new(NetworkFromFirstGuess(network.clone())) as _)
+/// At once, beside the other cheap sources: for small pairs, and where there is no other source.
+pub(super) fn at_once(options: &Options, network: Option<&Arc<LazyNetwork>>) -> Option<Box<dyn Proposals>> {
+    let pairs = if options.method == Method::Auto { AskedFor::Small } else { AskedFor::All };
+    let network = network?.clone();
+    Some(Box::new(NetworkFromFirstGuess { network, round: Round::Cheap, pairs }))
 }
 
-pub(super) fn all_around(options: &Options, network: Option<&Arc<Network>>) -> Option<Box<dyn Proposals>> {
+/// Where the cheap sources leave doubt.
+pub(super) fn from_first_guess(
+    options: &Options,
+    network: Option<&Arc<LazyNetwork>>,
+) -> Option<Box<dyn Proposals>> {
+    let network = network.filter(|_| options.method == Method::Auto)?.clone();
+    Some(Box::new(NetworkFromFirstGuess { network, round: Round::Network, pairs: AskedFor::Medium }))
+}
+
+pub(super) fn all_around(
+    options: &Options,
+    network: Option<&Arc<LazyNetwork>>,
+) -> Option<Box<dyn Proposals>> {
     let network = network.filter(|_| options.rotation == RotationRange::Any)?;
     Some(Box::new(AllAround(network.clone())))
 }
 
 impl Proposals for NetworkFromFirstGuess {
     fn round(&self) -> Round {
-        Round::Cheap
+        self.round
+    }
+
+    fn is_for(&self, pair: &PreparedPair) -> bool {
+        match self.pairs {
+            AskedFor::All => true,
+            AskedFor::Small => pair.is_small(),
+            AskedFor::Medium => pair.is_seen() && !pair.is_small(),
+        }
     }
 
     fn stage(&self) -> Option<Stage> {
@@ -43,7 +81,10 @@ impl Proposals for NetworkFromFirstGuess {
 
     fn propose(&self, pair: &PreparedPair) -> Proposed {
         let centre_to_centre = turned(pair.initial.rotation);
-        match self.0.look_from(&pair.source.thin, &pair.target_side().thin, &centre_to_centre) {
+        let look = |network: &Network| {
+            network.look_from(pair.source.thin(), pair.target_side().thin(), &centre_to_centre)
+        };
+        match self.network.get().and_then(look) {
             Ok(found) => Proposed {
                 starts: starts(&found),
                 network: Some(CoarsePose::new(&found, pair)),
@@ -59,14 +100,19 @@ impl Proposals for AllAround {
         Round::AllAround
     }
 
+    fn is_for(&self, pair: &PreparedPair) -> bool {
+        pair.is_seen()
+    }
+
     fn stage(&self) -> Option<Stage> {
         Some(Stage::NetworkAllAround)
     }
 
     fn propose(&self, pair: &PreparedPair) -> Proposed {
+        let Ok(network) = self.0.get() else { return Proposed::default() };
         let look = |(i, rotation): (usize, &Matrix3<f64>)| {
             let from = turned(pair.initial.rotation * rotation);
-            let found = self.0.glance_from(&pair.source.thin, &pair.target_side().thin, &from).ok()?;
+            let found = network.glance_from(pair.source.thin(), pair.target_side().thin(), &from).ok()?;
             Some(Proposal { start: Start::Orientation(i + 1), pose: found.target_from_source })
         };
         Proposed::starts(cube_rotations()[1..].par_iter().enumerate().filter_map(look).collect())
