@@ -34,6 +34,10 @@ pub struct Input {
     pub grid: Option<[usize; 2]>,
     /// What a user should know of the reading.
     pub notes: Vec<Note>,
+    /// Faces of the file that were left out, because a corner is NaN or infinite.
+    pub lost_faces: usize,
+    /// Which points of the file are in `cloud`, in their order; all of them where there is none.
+    pub kept: Option<Vec<bool>>,
 }
 
 /// Whether a path stands for standard input or output.
@@ -58,16 +62,33 @@ pub fn read(path: &Path, format: Option<&str>, options: ReadOptions) -> Result<I
     let name = path.display().to_string();
     let mut contents = file.contents()?;
     let grid = contents.grid;
+    let (points, faces) = (contents.points.len(), contents.faces.len());
+    let zero = if file.options().keep_zeros { None } else { contents.no_returns() };
+    let kept: Vec<bool> = (0..points)
+        .map(|i| contents.points[i].iter().all(|c| c.is_finite()) && !zero.as_ref().is_some_and(|zero| zero[i]))
+        .collect();
+    let zeros = if zero.is_some() { contents.drop_no_returns() } else { 0 };
     let dropped = contents.drop_not_finite();
+    let lost_faces = faces - contents.faces.len();
+    let kept = (zeros + dropped > 0).then_some(kept);
     let Contents { points, faces, single, viewpoint, notes, .. } = contents;
     let cloud = PointCloud::new(points).map_err(|error| match error {
+        CloudError::Empty if dropped == 0 => Failure::usage(format!(
+            "{name:?}: each of its {zeros} points lies at exactly 0, 0, 0, which stands for \"no return\"; write the file \
+             again with numbers, or keep them with --keep-zeros"
+        )),
+        CloudError::Empty if zeros > 0 => Failure::usage(format!(
+            "{name:?}: each of its {} points is NaN, infinite, or at exactly 0, 0, 0, which stand for \"no return\"; write the \
+             file again with numbers",
+            zeros + dropped
+        )),
         CloudError::Empty => Failure::usage(format!(
             "{name:?}: each of its {dropped} points has a coordinate that is NaN or infinite; write the file again with \
              numbers"
         )),
         other => Failure::cloud(&name, &other),
     })?;
-    Ok(Input { name, file, cloud, dropped, faces, single, viewpoint, grid, notes })
+    Ok(Input { name, file, cloud, dropped, faces, single, viewpoint, grid, notes, lost_faces, kept })
 }
 
 /// As [`read`], of a cloud that determines a rotation.

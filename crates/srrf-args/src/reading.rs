@@ -37,6 +37,10 @@ pub struct ReadFlags {
     #[arg(long, value_name = value::NUMBER, value_parser = whole(1, MOST))]
     pub message: Option<usize>,
 
+    /// Keep points at exactly 0, 0, 0 where they lie in a pile, which stands for "no return" of depth cameras and scanners
+    #[arg(long)]
+    pub keep_zeros: bool,
+
     /// Most memory that reading a file may take, such as `4G` [default: half of the machine's]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub max_memory: Option<u64>,
@@ -52,6 +56,7 @@ impl ReadFlags {
             scan: self.scan,
             topic: self.topic.clone(),
             message: self.message,
+            keep_zeros: self.keep_zeros,
             max_memory: self.max_memory,
         }
     }
@@ -93,6 +98,7 @@ macro_rules! of_one_cloud {
                     scan: self.scan.or(both.scan),
                     topic: self.topic.clone().or(both.topic),
                     message: self.message.or(both.message),
+                    keep_zeros: both.keep_zeros,
                     max_memory: both.max_memory,
                 }
             }
@@ -148,7 +154,7 @@ impl PairReadFlags {
 
 /// What was asked, in words that stay the same: each option that is set, as `name=value`.
 pub fn described(options: &ReadOptions) -> Vec<String> {
-    let ReadOptions { columns, array, layout, scan, topic, message, max_memory: _ } = options;
+    let ReadOptions { columns, array, layout, scan, topic, message, keep_zeros, max_memory: _ } = options;
     [
         columns.as_ref().map(|v| format!("columns={v}")),
         array.as_ref().map(|v| format!("array={v}")),
@@ -156,6 +162,7 @@ pub fn described(options: &ReadOptions) -> Vec<String> {
         scan.map(|v| format!("scan={v}")),
         topic.as_ref().map(|v| format!("topic={v}")),
         message.map(|v| format!("message={v}")),
+        keep_zeros.then(|| "keep-zeros".to_owned()),
     ]
     .into_iter()
     .flatten()

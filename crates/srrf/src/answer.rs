@@ -15,6 +15,7 @@ use crate::network::WeightsId;
 use crate::outcome::{Outcome, PointCounts, TriedStart};
 use crate::probability::Probability;
 use crate::scale::AppliedScale;
+use crate::surface::DrawnSurface;
 use crate::warning::Warning;
 
 /// A pose as 4 rows of 4.
@@ -38,6 +39,8 @@ pub struct Answer {
     pub target_from_source: Matrix4,
     /// The factor by which the source was multiplied first; null where there is none.
     pub scale: Option<AppliedScale>,
+    /// What the clouds are drawn from, where source or target is a mesh.
+    pub surfaces: SurfacesAnswer,
     /// Calibrated probability that the pose is right.
     #[schemars(with = "f64", range(min = 0.0, max = 1.0))]
     pub probability: Probability,
@@ -76,6 +79,16 @@ pub struct Answer {
     /// What the programs know besides.
     #[serde(flatten)]
     pub run: RunKeys,
+}
+
+/// What the clouds of source and target are drawn from; null for a cloud.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct SurfacesAnswer {
+    /// The mesh of the source.
+    pub source: Option<DrawnSurface>,
+    /// The mesh of the target.
+    pub target: Option<DrawnSurface>,
 }
 
 /// What the programs know of an answer besides: its files, and its line in a batch. The library leaves them out.
@@ -226,6 +239,7 @@ impl Answer {
             schema: AnswerVersion::V1,
             target_from_source: matrix(pose),
             scale: outcome.scale,
+            surfaces: SurfacesAnswer { source: outcome.surfaces[0], target: outcome.surfaces[1] },
             probability: outcome.probability,
             abstain: outcome.abstain,
             quaternion_wxyz: outcome.quaternion_wxyz(),

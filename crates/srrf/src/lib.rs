@@ -71,7 +71,7 @@ pub use skeleton::{FoundSkeleton, skeleton};
 pub use srrf_align::Map;
 pub use stage::{Stage, StageTime};
 pub use start::Start;
-pub use surface::{Counterpart, SurfaceDraw};
+pub use surface::{Counterpart, DrawnSurface, SurfaceDraw};
 pub use target::Target;
 pub use warning::Warning;
 

@@ -14,6 +14,7 @@ use crate::probability::Probability;
 use crate::scale::AppliedScale;
 use crate::stage::StageTime;
 use crate::start::Start;
+use crate::surface::DrawnSurface;
 use crate::warning::Warning;
 
 /// Numbers of points.
@@ -45,6 +46,8 @@ pub struct Outcome {
     pub target_from_source: Rigid,
     /// The factor by which the source was multiplied first, if there is one: `target ~ R (factor * source) + t`.
     pub scale: Option<AppliedScale>,
+    /// What the clouds of source and target are drawn from, where they are meshes.
+    pub surfaces: [Option<DrawnSurface>; 2],
     /// Calibrated probability that the pose is within 5 degrees and a tenth of the target's radius
     /// (root mean square) of the true one; see [`crate::Logistic`].
     pub probability: Probability,

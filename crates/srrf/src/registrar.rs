@@ -162,6 +162,7 @@ impl Registrar {
         Outcome {
             target_from_source: pair.frame.undo_pose(&best.pose),
             scale: None,
+            surfaces: [None; 2],
             probability,
             abstain,
             method: self.options.method,

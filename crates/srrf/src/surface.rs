@@ -1,5 +1,6 @@
 //! [`SurfaceDraw`]: how densely a surface is drawn for the cloud that it is registered with.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use srrf_cloud::{LEAST_SAMPLES, MOST_SAMPLES, PointCloud, TriangleMesh};
 
@@ -20,8 +21,8 @@ pub enum Counterpart<'a> {
 }
 
 /// How the cloud of a surface comes about.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "lowercase", tag = "from")]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum SurfaceDraw {
     /// So many points are drawn, by area.
     Surface {
@@ -32,6 +33,19 @@ pub enum SurfaceDraw {
     },
     /// The vertices are dense enough already, as those of a scanned surface are.
     Vertices,
+}
+
+/// What was made of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct DrawnSurface {
+    /// Vertices of the mesh.
+    pub vertices: usize,
+    /// Its faces.
+    pub faces: usize,
+    /// Faces without an area, or with a corner that is NaN or infinite.
+    pub faces_left_out: usize,
+    /// How its cloud came about; none where the vertices were asked for.
+    pub draw: Option<SurfaceDraw>,
 }
 
 impl SurfaceDraw {

@@ -58,9 +58,40 @@ impl Contents {
     }
 }
 
+/// So many points at exactly 0, 0, 0 are no points: cameras and scanners write them for "no return".
+const PILE: usize = 3;
+
+impl Contents {
+    /// Which points stand for "no return": those at exactly 0, 0, 0, where they are several. None in a mesh.
+    pub fn no_returns(&self) -> Option<Vec<bool>> {
+        let is_zero = |p: &[f64; 3]| p.iter().all(|c| *c == 0.0);
+        let pile = self.points.iter().filter(|p| is_zero(p)).count() >= PILE;
+        (pile && self.faces.is_empty()).then(|| self.points.iter().map(is_zero).collect())
+    }
+
+    /// Takes the points away that stand for "no return" ([`no_returns`](Self::no_returns)), says so in a note, and how many they were.
+    /// A cloud that loses points is no longer organised.
+    pub fn drop_no_returns(&mut self) -> usize {
+        let Some(zero) = self.no_returns() else { return 0 };
+        let before = self.points.len();
+        let mut zeros = zero.into_iter();
+        self.points.retain(|_| !zeros.next().unwrap_or(false));
+        let points = before - self.points.len();
+        self.notes.push(Note::NoReturns { points, organised: self.grid.take().is_some() });
+        points
+    }
+}
+
 /// What a user should know of a reading. [`fmt::Display`] gives a sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Note {
+    /// Points at exactly 0, 0, 0 were left out, since they stand for "no return".
+    NoReturns {
+        /// How many.
+        points: usize,
+        /// Whether the cloud was organised, as depth cameras write them.
+        organised: bool,
+    },
     /// Something in the file was passed over.
     Ignored {
         /// What, such as `3 lines that begin with "foo"`.
@@ -88,6 +119,12 @@ pub enum Note {
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::NoReturns { points, organised } => write!(
+                f,
+                "{points} points{} at exactly 0, 0, 0 were left out, since such a pile stands for \"no return\"; \
+                 `--keep-zeros` keeps them",
+                if *organised { " of the organised cloud" } else { "" }
+            ),
             Self::Ignored { what } => write!(f, "passed over {what}"),
             Self::ExtraBytes { bytes: 1 } => f.write_str("passed over 1 byte behind the end"),
             Self::ExtraBytes { bytes } => write!(f, "passed over {bytes} bytes behind the end"),
@@ -205,5 +242,28 @@ mod tests {
         assert_eq!(contents.points, [[0.0; 3], [1.0; 3], [2.0; 3]]);
         assert_eq!((contents.faces.as_slice(), contents.grid), (&[[0, 1, 2], [2, 1, 0]][..], None));
         assert_eq!(contents.drop_not_finite(), 0);
+    }
+
+    #[test]
+    fn a_pile_at_the_origin_is_no_return() {
+        let zeros = [[0.0; 3], [0.0, -0.0, 0.0], [0.0; 3]];
+        let cloud = |zeros: &[[f64; 3]]| {
+            let mut contents = Contents::of_points(vec![[1.0, 2.0, 3.0], [0.0, 0.0, 4.0]]);
+            contents.points.splice(1..1, zeros.iter().copied());
+            contents.grid = Some([contents.points.len(), 1]);
+            contents
+        };
+        let mut camera = cloud(&zeros);
+        assert_eq!(camera.drop_no_returns(), 3);
+        assert_eq!(camera.points, [[1.0, 2.0, 3.0], [0.0, 0.0, 4.0]]);
+        assert_eq!(camera.grid, None);
+        let note = camera.notes[0].to_string();
+        assert!(note.starts_with("3 points of the organised cloud at exactly 0, 0, 0"), "{note}");
+        // One or two may be points.
+        let mut few = cloud(&zeros[..2]);
+        assert_eq!((few.drop_no_returns(), few.points.len(), few.notes.len()), (0, 4, 0));
+        // Many triangles of a mesh may meet at the origin.
+        let mut mesh = Contents { faces: vec![[0, 1, 2]], ..cloud(&zeros) };
+        assert_eq!((mesh.drop_no_returns(), mesh.points.len()), (0, 5));
     }
 }

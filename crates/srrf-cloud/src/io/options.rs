@@ -22,6 +22,8 @@ pub struct ReadOptions {
     pub topic: Option<String>,
     /// Number of the message, from 1.
     pub message: Option<usize>,
+    /// Whether points at exactly 0, 0, 0 stay although they lie there in a pile, which stands for "no return".
+    pub keep_zeros: bool,
     /// Most bytes of memory that reading may take, the file's own included; half of the machine's without it.
     pub max_memory: Option<u64>,
 }

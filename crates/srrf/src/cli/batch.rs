@@ -10,13 +10,14 @@ use std::sync::{Mutex, PoisonError};
 use clap::{Args, Subcommand};
 use rayon::ThreadPoolBuilder;
 use serde_json::{Value, json};
-use srrf::{Registrar, Request};
+use srrf::{Registrar, Request, Target};
 
 use super::common::{failed, to_json, unusable, warnings_of};
 use super::method::MethodArgs;
 use super::page::{self, PageArgs};
 use super::poses::{PoseReading, looks_inverted};
 use super::scale::{self, ScaleArgs};
+use super::surface::SurfaceArgs;
 use srrf_args::files::Input;
 use srrf_args::flags::{Common, Quiet, value};
 use srrf_args::reading::{PairReadFlags, described as described_reading};
@@ -98,6 +99,9 @@ pub struct BatchArgs {
 
     #[command(flatten)]
     reading: PoseReading,
+
+    #[command(flatten)]
+    surface: SurfaceArgs,
 
     #[command(flatten)]
     read: PairReadFlags,
@@ -267,8 +271,11 @@ impl BatchArgs {
             "refine": !m.no_refine,
             "weights": m.weights.weights,
             "seed": m.seed.seed,
-            "scale": self.scale.describe(),
         });
+        if let Value::Object(map) = &mut described {
+            map.extend(self.scale.describe().map(|scale| ("scale".to_owned(), scale)));
+            map.extend(self.surface.vertices.then(|| ("vertices".to_owned(), json!(true))));
+        }
         let reading = [described_reading(&self.read.source()), described_reading(&self.read.target())];
         if let (Value::Object(map), true) = (&mut described, reading.iter().any(|set| !set.is_empty())) {
             map.insert("reading".into(), json!(reading));
@@ -345,8 +352,11 @@ impl Batch<'_> {
     fn line(&self, row: &ListedPair) -> BatchRow {
         let target = || -> Result<ReadyTarget, String> {
             let input = self.read_target(row).map_err(|e| e.to_string())?;
-            let target = self.registrar.prepare(&input.cloud);
-            let target = target.map_err(|e| failed(e, &row.source, &input.name).to_string())?;
+            let target = if self.args.surface.draws(&input) {
+                None // drawn for each source, as dense as that one is
+            } else {
+                Some(self.prepare(row, &input).map_err(|e| e.to_string())?)
+            };
             Ok(ReadyTarget { input, target })
         };
         // What a pair has made is not looked at again after a panic.
@@ -363,15 +373,34 @@ impl Batch<'_> {
         files::read_solid(&self.pairs.path(&row.target), None, self.args.read.target())
     }
 
+    fn prepare(&self, row: &ListedPair, target: &Input) -> Result<Target, Failure> {
+        self.registrar.prepare(&target.cloud).map_err(|e| failed(e, &row.source, &target.name))
+    }
+
     fn register(&self, row: &ListedPair, ready: &ReadyTarget) -> Result<Value, Failure> {
-        let ReadyTarget { input: target, target: prepared } = ready;
         let mut source = files::read_solid(&self.pairs.path(&row.source), None, self.args.read.source())?;
         self.args.scale.apply(&mut source)?;
+        let (one_unit, seed) = (self.args.scale.is_one_unit(), self.args.method.seed.seed);
+        let (own, own_target);
+        let (target, prepared, surfaces) = match &ready.target {
+            Some(prepared) => {
+                let surfaces = self.args.surface.draw_source(&mut source, &ready.input, one_unit, seed)?;
+                (&ready.input, prepared, surfaces)
+            }
+            None => {
+                let mut mesh = self.read_target(row)?;
+                let surfaces = self.args.surface.draw(&mut source, &mut mesh, one_unit, seed)?;
+                own_target = self.prepare(row, &mesh)?;
+                own = mesh;
+                (&own, &own_target, surfaces)
+            }
+        };
         let read = |file: &String| self.args.reading.read(&self.pairs.path(file));
         let initial = row.initial.as_ref().map(read).transpose()?.map(|guess| guess.target_from_source);
         let request = Request { initial, ..Request::new(&source.cloud, prepared) };
         let found = self.args.scale.register(self.registrar, &request);
         let mut outcome = found.map_err(|e| failed(e, &source.name, &target.name))?;
+        outcome.surfaces = surfaces;
         let dropped = [source.dropped, target.dropped];
         outcome.warnings.extend([&source, target].into_iter().flat_map(warnings_of));
         outcome.warnings.extend(initial.and_then(|pose| looks_inverted(&pose, &source.cloud, &target.cloud)));

@@ -27,6 +27,7 @@ mod scale;
 mod skeleton;
 mod statistics;
 mod summary;
+mod surface;
 mod view;
 mod watch;
 mod weights;

@@ -89,6 +89,14 @@ pub fn of_outcome<'a>(
         )
         .number(Number::new("RMSE of the inliers", e.inlier_rmse))
         .number(Number::text("Start", outcome.start.to_string()));
+    for (which, drawn) in ["Source", "Target"].into_iter().zip(&outcome.surfaces) {
+        if let Some(drawn) = drawn {
+            pair = pair.number(Number::text(which, super::surface::text(drawn)));
+        }
+    }
+    if let Some(words) = super::scale::text(outcome) {
+        pair = pair.number(Number::text("Scale", words));
+    }
     if let Some(initial) = initial {
         pair = pair.before(Pose::new("first guess", *initial));
     }

@@ -15,6 +15,7 @@ use super::method::MethodArgs;
 use super::page::{self, PageArgs};
 use super::poses::{PoseReading, PoseWriting, described, looks_inverted};
 use super::scale::{self, ScaleArgs};
+use super::surface::SurfaceArgs;
 use super::watch::Watch;
 use super::{rrd, summary};
 use srrf_args::files::{self, Input};
@@ -82,6 +83,9 @@ pub struct RegisterArgs {
     #[command(flatten)]
     scale: ScaleArgs,
 
+    #[command(flatten)]
+    surface: SurfaceArgs,
+
     /// Format of the source where it is a stream [default: by its content]
     #[arg(long, alias = "format-source", value_name = "NAME")]
     source_format: Option<String>,
@@ -115,8 +119,10 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
     // The network loads while the files are read.
     let (inputs, registrar) =
         rayon::join(|| args.read(), || Registrar::new(args.scale.options(args.method.options())));
-    let (mut source, target) = inputs?;
+    let (mut source, mut target) = inputs?;
     args.scale.apply(&mut source)?;
+    let (one_unit, seed) = (args.scale.is_one_unit(), args.method.seed.seed);
+    let surfaces = args.surface.draw(&mut source, &mut target, one_unit, seed)?;
     let registrar = registrar.map_err(unusable)?;
     let opened = begun.elapsed().as_secs_f64();
 
@@ -125,6 +131,7 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
     let mut outcome =
         args.scale.register(&registrar, &request).map_err(|e| failed(e, &source.name, &target.name))?;
     scale::applied(&outcome, &mut source)?;
+    outcome.surfaces = surfaces;
     outcome.times.insert(0, StageTime { stage: Stage::Open, seconds: opened });
     outcome.warnings.extend([&source, &target].into_iter().flat_map(warnings_of));
     outcome.warnings.extend(initial.and_then(|pose| looks_inverted(&pose, &source.cloud, &target.cloud)));

@@ -59,6 +59,11 @@ impl ScaleArgs {
         }
     }
 
+    /// Whether both clouds are taken to be in one unit, once [`apply`](Self::apply) was applied.
+    pub fn is_one_unit(&self) -> bool {
+        self.scale != Some(ScaleChoice::Auto)
+    }
+
     /// The options, with a question about the scale where none was given.
     pub fn options(&self, options: Options) -> Options {
         Options { check_scale: self.given().is_none() && self.scale.is_none(), ..options }
@@ -91,11 +96,11 @@ impl ScaleArgs {
     }
 
     /// For records of what an answer was made with.
-    pub fn describe(&self) -> Value {
+    pub fn describe(&self) -> Option<Value> {
         match (self.scale, self.given()) {
-            (Some(ScaleChoice::Auto), _) => json!("auto"),
-            (_, Some(given)) => json!(given.factor),
-            _ => Value::Null,
+            (Some(ScaleChoice::Auto), _) => Some(json!("auto")),
+            (_, Some(given)) => Some(json!(given.factor)),
+            _ => None,
         }
     }
 }
@@ -146,7 +151,7 @@ mod tests {
             target_unit: Some(LengthUnit::Metre),
             scale: None,
         };
-        assert_eq!(args.describe(), json!(0.001));
+        assert_eq!(args.describe(), Some(json!(0.001)));
         assert!(!args.options(Options::default()).check_scale);
         let none = ScaleArgs { source_unit: None, target_unit: None, scale: None };
         assert!(none.options(Options::default()).check_scale && none.given().is_none());

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use nalgebra::Vector3;
-use srrf::Outcome;
+use srrf::{DrawnSurface, Outcome};
 use srrf_cloud::RIGHT_IN_WORDS;
 
 use srrf_args::files::Input;
@@ -16,8 +16,8 @@ pub fn text(outcome: &Outcome, source: &Input, target: &Input, seconds: f64) -> 
         // Writing to a string cannot fail.
         let _ = writeln!(out, "{label:12} {value}");
     };
-    line("source", &cloud(source));
-    line("target", &cloud(target));
+    line("source", &cloud(source, &outcome.surfaces[0]));
+    line("target", &cloud(target, &outcome.surfaces[1]));
 
     let pose = &outcome.target_from_source;
     let (angle, axis) = angle_axis(outcome);
@@ -78,7 +78,10 @@ fn evidence(outcome: &Outcome, line: &mut impl FnMut(&str, &str)) {
     }
 }
 
-fn cloud(input: &Input) -> String {
+fn cloud(input: &Input, surface: &Option<DrawnSurface>) -> String {
+    if let Some(drawn) = surface {
+        return format!("{}: {}", input.name, super::surface::text(drawn));
+    }
     let dropped = match input.dropped {
         0 => String::new(),
         n => format!(", {} more with NaN or infinity left out", count(n)),

@@ -1,12 +1,11 @@
 //! Meshes are surfaces: what has faces is drawn as densely as the cloud that it is registered with.
 
 use clap::Args;
-use serde_json::{Value, json};
-use srrf::{Counterpart, SurfaceDraw};
+use srrf::{Counterpart, DrawnSurface, SurfaceDraw};
 use srrf_args::Failure;
 use srrf_args::files::Input;
 use srrf_args::words::{count, counted, length};
-use srrf_cloud::{MeshError, TriangleMesh};
+use srrf_cloud::{MeshError, PointCloud, TriangleMesh};
 
 /// How meshes become clouds.
 #[derive(Debug, Clone, Copy, Args)]
@@ -16,54 +15,23 @@ pub struct SurfaceArgs {
     pub vertices: bool,
 }
 
-/// What was made of a mesh.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drawn {
-    /// Vertices of the mesh.
-    vertices: usize,
-    /// Its faces.
-    faces: usize,
-    /// Faces without an area.
-    left_out: usize,
-    /// How its cloud came about; none where its vertices were asked for.
-    draw: Option<SurfaceDraw>,
-}
-
-impl Drawn {
-    /// For the terminal and pages.
-    pub fn text(&self) -> String {
-        let mesh = format!("a mesh of {}", counted(self.faces, "face"));
-        let left_out = match self.left_out {
-            0 => String::new(),
-            n => format!("; {} without an area passed over", counted(n, "face")),
-        };
-        let how = match self.draw {
-            None => format!("its {} vertices are the cloud, as asked", count(self.vertices)),
-            Some(SurfaceDraw::Vertices) => {
-                format!("its {} vertices lie dense enough and are the cloud", count(self.vertices))
-            }
-            Some(SurfaceDraw::Surface { points, spacing }) => format!(
-                "{} points drawn from its surface, {} apart; --vertices takes its {} vertices",
-                count(points),
-                length(spacing, 2),
-                count(self.vertices)
-            ),
-        };
-        format!("{mesh}: {how}{left_out}")
-    }
-
-    /// For the JSON.
-    pub fn to_json(self) -> Value {
-        let drawn = match self.draw {
-            None => json!({ "from": "vertices" }),
-            Some(draw) => json!(draw),
-        };
-        let mut value = json!({ "vertices": self.vertices, "faces": self.faces, "faces_left_out": self.left_out });
-        if let (Value::Object(map), Value::Object(drawn)) = (&mut value, drawn) {
-            map.extend(drawn);
-        }
-        value
-    }
+/// What was made of a mesh, in words.
+pub fn text(drawn: &DrawnSurface) -> String {
+    let vertices = count(drawn.vertices);
+    let left_out = match drawn.faces_left_out {
+        0 => String::new(),
+        n => format!("; {} without an area passed over", counted(n, "face")),
+    };
+    let how = match drawn.draw {
+        None => format!("its {vertices} vertices are the cloud, as asked"),
+        Some(SurfaceDraw::Vertices) => format!("its {vertices} vertices lie dense enough and are the cloud"),
+        Some(SurfaceDraw::Surface { points, spacing }) => format!(
+            "{} points drawn from its surface, {} apart; --vertices takes its {vertices} vertices",
+            count(points),
+            length(spacing, 2),
+        ),
+    };
+    format!("a mesh of {}: {how}{left_out}", counted(drawn.faces, "face"))
 }
 
 impl SurfaceArgs {
@@ -78,42 +46,92 @@ impl SurfaceArgs {
         target: &mut Input,
         one_unit: bool,
         seed: u64,
-    ) -> Result<[Option<Drawn>; 2], Failure> {
+    ) -> Result<[Option<DrawnSurface>; 2], Failure> {
+        let [of_source, of_target] = self.plan(source, target, one_unit, seed)?;
+        Ok([of_source.apply(source), of_target.apply(target)])
+    }
+
+    /// As [`draw`](Self::draw), with a target that is no mesh.
+    ///
+    /// # Errors
+    /// As [`draw`](Self::draw).
+    pub fn draw_source(
+        self,
+        source: &mut Input,
+        target: &Input,
+        one_unit: bool,
+        seed: u64,
+    ) -> Result<[Option<DrawnSurface>; 2], Failure> {
+        let [of_source, of_target] = self.plan(source, target, one_unit, seed)?;
+        Ok([of_source.apply(source), of_target.drawn])
+    }
+
+    /// Whether points are drawn from a cloud's surface, or may be.
+    pub fn draws(self, input: &Input) -> bool {
+        !self.vertices && input.faces.len() + input.lost_faces > 0
+    }
+
+    fn plan(
+        self,
+        source: &Input,
+        target: &Input,
+        one_unit: bool,
+        seed: u64,
+    ) -> Result<[Plan; 2], Failure> {
+        let inputs = [source, target];
         let meshes = [mesh(source, self.vertices)?, mesh(target, self.vertices)?];
-        let drawn = {
-            let clouds = [&*source, &*target].map(|input| &input.cloud);
-            let other = |i: usize| match (&meshes[1 - i], one_unit) {
-                (Some(mesh), _) => Counterpart::Surface(mesh),
-                (None, true) => Counterpart::Cloud(clouds[1 - i]),
-                (None, false) => Counterpart::CloudOfAnyScale(clouds[1 - i]),
-            };
-            [0, 1].map(|i| {
-                let mesh = meshes[i].as_ref()?;
-                Some(SurfaceDraw::for_counterpart(mesh, clouds[i].len(), other(i)))
-            })
+        let other = |i: usize| match (&meshes[1 - i], one_unit) {
+            (Some(mesh), _) => Counterpart::Surface(mesh),
+            (None, true) => Counterpart::Cloud(&inputs[1 - i].cloud),
+            (None, false) => Counterpart::CloudOfAnyScale(&inputs[1 - i].cloud),
         };
-        let made = |i: usize, input: &mut Input| {
-            if input.faces.is_empty() {
-                return None;
+        Ok([0, 1].map(|i| {
+            let faces = inputs[i].faces.len() + inputs[i].lost_faces;
+            if faces == 0 {
+                return Plan::default();
             }
-            let (vertices, faces) = (input.cloud.len(), input.faces.len());
-            let left_out = meshes[i].as_ref().map_or(0, TriangleMesh::left_out);
-            if let (Some(mesh), Some(SurfaceDraw::Surface { points, .. })) = (&meshes[i], drawn[i]) {
+            let (vertices, mesh) = (inputs[i].cloud.len(), meshes[i].as_ref());
+            let draw = mesh.map(|mesh| SurfaceDraw::for_counterpart(mesh, vertices, other(i)));
+            let cloud = match (mesh, draw) {
                 // Two meshes get draws of their own.
-                input.cloud = mesh.sample(points, seed.wrapping_add(i as u64));
-            }
-            Some(Drawn { vertices, faces, left_out, draw: drawn[i] })
-        };
-        Ok([made(0, source), made(1, target)])
+                (Some(mesh), Some(SurfaceDraw::Surface { points, .. })) => {
+                    Some(mesh.sample(points, seed.wrapping_add(i as u64)))
+                }
+                _ => None,
+            };
+            let faces_left_out = mesh.map_or(0, TriangleMesh::left_out) + inputs[i].lost_faces;
+            Plan { drawn: Some(DrawnSurface { vertices, faces, faces_left_out, draw }), cloud }
+        }))
+    }
+}
+
+/// What becomes of an input.
+#[derive(Debug, Default)]
+struct Plan {
+    drawn: Option<DrawnSurface>,
+    /// Where it is not its vertices.
+    cloud: Option<PointCloud>,
+}
+
+impl Plan {
+    fn apply(self, input: &mut Input) -> Option<DrawnSurface> {
+        if let Some(cloud) = self.cloud {
+            input.cloud = cloud;
+        }
+        self.drawn
     }
 }
 
 /// The surface of a mesh; none of a cloud, and where the vertices are asked for.
 fn mesh(input: &Input, vertices: bool) -> Result<Option<TriangleMesh>, Failure> {
-    if vertices || input.faces.is_empty() {
+    if vertices || input.faces.len() + input.lost_faces == 0 {
         return Ok(None);
     }
-    let made = TriangleMesh::new(input.cloud.points(), &input.faces);
+    let made = if input.faces.is_empty() {
+        Err(MeshError::NoArea { faces: input.lost_faces })
+    } else {
+        TriangleMesh::new(input.cloud.points(), &input.faces)
+    };
     made.map(Some).map_err(|error: MeshError| {
         let points = count(input.cloud.len());
         let message = format!(
@@ -130,17 +148,13 @@ mod tests {
 
     #[test]
     fn what_was_made_of_a_mesh_is_said() {
-        let drawn = |draw| Drawn { vertices: 20, faces: 1_236, left_out: 1, draw };
+        let drawn = |draw| DrawnSurface { vertices: 20, faces: 1_236, faces_left_out: 1, draw };
         let surface = drawn(Some(SurfaceDraw::Surface { points: 40_000, spacing: 0.004_2 }));
         assert_eq!(
-            surface.text(),
+            text(&surface),
             "a mesh of 1,236 faces: 40,000 points drawn from its surface, 0.0042 apart; --vertices takes its 20 vertices; \
              1 face without an area passed over"
         );
-        assert_eq!(surface.to_json()["points"], 40_000);
-        assert_eq!(surface.to_json()["from"], "surface");
-        let asked = drawn(None);
-        assert!(asked.text().contains("its 20 vertices are the cloud, as asked"), "{}", asked.text());
-        assert_eq!(asked.to_json()["from"], "vertices");
+        assert!(text(&drawn(None)).contains("its 20 vertices are the cloud, as asked"));
     }
 }

@@ -8,6 +8,7 @@ use srrf_view::Pose;
 
 use super::page::{self, PageArgs};
 use super::poses::{PoseReading, described, looks_inverted};
+use super::surface::{self, SurfaceArgs};
 use srrf_args::flags::Common;
 use srrf_args::reading::PairReadFlags;
 use srrf_args::{Failure, Output, OutputKind, Places, files};
@@ -39,6 +40,9 @@ pub struct ViewArgs {
     png: Option<PathBuf>,
 
     #[command(flatten)]
+    surface: SurfaceArgs,
+
+    #[command(flatten)]
     page: PageArgs,
 
     #[command(flatten)]
@@ -65,9 +69,15 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode, Failure> {
     let pose = args.transform.as_deref().map(|path| args.reading.read(path)).transpose()?;
     let progress = args.common.progress();
     progress.step(format!("reading {:?} and {:?}", args.source, args.target));
-    let source = files::read(&args.source, None, args.read.source())?;
-    let target = files::read(&args.target, None, args.read.target())?;
+    let mut source = files::read(&args.source, None, args.read.source())?;
+    let mut target = files::read(&args.target, None, args.read.target())?;
+    let surfaces = args.surface.draw(&mut source, &mut target, true, 0)?;
     let mut pair = args.page.pair(&source, &target);
+    for (input, drawn) in [&source, &target].into_iter().zip(&surfaces) {
+        if let Some(drawn) = drawn {
+            pair = pair.warning(format!("{}: {}.", input.name, surface::text(drawn)));
+        }
+    }
     if let Some(pose) = &pose {
         out.say(&described("--transform", pose));
         let name = if pose.abstained { "given, abstained" } else { "given" };

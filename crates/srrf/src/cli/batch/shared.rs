@@ -13,7 +13,8 @@ const KEPT: usize = 32;
 #[derive(Debug)]
 pub struct ReadyTarget {
     pub input: Input,
-    pub target: Target,
+    /// None for a mesh, whose points are drawn for each source.
+    pub target: Option<Target>,
 }
 
 /// Ready, or in words why not.
