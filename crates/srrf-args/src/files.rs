@@ -65,7 +65,9 @@ pub fn read(path: &Path, format: Option<&str>, options: ReadOptions) -> Result<I
     let (points, faces) = (contents.points.len(), contents.faces.len());
     let zero = if file.options().keep_zeros { None } else { contents.no_returns() };
     let kept: Vec<bool> = (0..points)
-        .map(|i| contents.points[i].iter().all(|c| c.is_finite()) && !zero.as_ref().is_some_and(|zero| zero[i]))
+        .map(|i| {
+            contents.points[i].iter().all(|c| c.is_finite()) && !zero.as_ref().is_some_and(|zero| zero[i])
+        })
         .collect();
     let zeros = if zero.is_some() { contents.drop_no_returns() } else { 0 };
     let dropped = contents.drop_not_finite();

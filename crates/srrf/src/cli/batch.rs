@@ -18,6 +18,7 @@ use super::page::{self, PageArgs};
 use super::poses::{PoseReading, looks_inverted};
 use super::scale::{self, ScaleArgs};
 use super::surface::SurfaceArgs;
+use super::values::ShownValues;
 use srrf_args::files::Input;
 use srrf_args::flags::{Common, Quiet, value};
 use srrf_args::reading::{PairReadFlags, described as described_reading};
@@ -406,7 +407,9 @@ impl Batch<'_> {
         outcome.warnings.extend(initial.and_then(|pose| looks_inverted(&pose, &source.cloud, &target.cloud)));
         if let Some(folder) = &self.args.html {
             scale::applied(&outcome, &mut source)?;
-            let pair = page::of_outcome(&outcome, &source, target, initial.as_ref(), &self.args.page);
+            let values = ShownValues::of_pair(&source, target);
+            let pair =
+                page::of_outcome(&outcome, &source, target, &values, initial.as_ref(), &self.args.page);
             let html = page::html(pair, &source, target);
             files::write(&folder.join(overview::page_name(&row.id)), html.as_bytes())?;
         }

@@ -71,13 +71,7 @@ impl SurfaceArgs {
         !self.vertices && input.faces.len() + input.lost_faces > 0
     }
 
-    fn plan(
-        self,
-        source: &Input,
-        target: &Input,
-        one_unit: bool,
-        seed: u64,
-    ) -> Result<[Plan; 2], Failure> {
+    fn plan(self, source: &Input, target: &Input, one_unit: bool, seed: u64) -> Result<[Plan; 2], Failure> {
         let inputs = [source, target];
         let meshes = [mesh(source, self.vertices)?, mesh(target, self.vertices)?];
         let other = |i: usize| match (&meshes[1 - i], one_unit) {
