@@ -28,6 +28,7 @@ mod skeleton;
 mod statistics;
 mod summary;
 mod surface;
+mod values;
 mod view;
 mod watch;
 mod weights;

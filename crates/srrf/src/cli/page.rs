@@ -8,6 +8,7 @@ use srrf_cloud::{RIGHT_IN_WORDS, Rigid};
 use srrf_view::{Number, Page, Pair, Pose, Tone, Up};
 
 use super::common::warnings_of;
+use super::values::ShownValues;
 use srrf_args::Failure;
 use srrf_args::files::Input;
 use srrf_args::words::count;
@@ -32,10 +33,14 @@ fn axis(name: &str) -> Result<Up, String> {
 }
 
 impl PageArgs {
-    /// A pair without poses.
-    pub fn pair<'a>(&self, source: &'a Input, target: &'a Input) -> Pair<'a> {
-        let mut pair = Pair::new(title(source, target), &source.cloud, &target.cloud).unit(&*self.unit);
-        if let Some(up) = self.up {
+    /// A pair without poses; `values` are what source and target have for each point.
+    pub fn pair<'a>(&self, source: &'a Input, target: &'a Input, values: &'a [ShownValues; 2]) -> Pair<'a> {
+        let mut pair = Pair::new(title(source, target), &source.cloud, &target.cloud)
+            .unit(&*self.unit)
+            .values(values[0].shown(), values[1].shown());
+        // The frame of a depth camera: y down, z forward.
+        let camera = target.grid.is_some() && target.cloud.points().iter().all(|p| p[2] > 0.0);
+        if let Some(up) = self.up.or(camera.then_some(Up::MinusY)) {
             pair = pair.up(up);
         }
         for input in [source, target] {
@@ -61,6 +66,7 @@ pub fn of_outcome<'a>(
     outcome: &Outcome,
     source: &'a Input,
     target: &'a Input,
+    values: &'a [ShownValues; 2],
     initial: Option<&Rigid>,
     args: &PageArgs,
 ) -> Pair<'a> {
@@ -69,7 +75,7 @@ pub fn of_outcome<'a>(
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let (angle, _) = super::summary::angle_axis(outcome);
     let mut pair = args
-        .pair(source, target)
+        .pair(source, target, values)
         .pose(Pose::new("result", outcome.target_from_source))
         .number(
             Number::text("Verdict", format!("{verdict} ({})", percent(outcome.probability.get())))

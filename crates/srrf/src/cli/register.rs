@@ -16,6 +16,7 @@ use super::page::{self, PageArgs};
 use super::poses::{PoseReading, PoseWriting, described, looks_inverted};
 use super::scale::{self, ScaleArgs};
 use super::surface::SurfaceArgs;
+use super::values::ShownValues;
 use super::watch::Watch;
 use super::{rrd, summary};
 use srrf_args::files::{self, Input};
@@ -216,15 +217,17 @@ impl RegisterArgs {
             files::write(path, format!("{text}\n").as_bytes())?;
             lines.push(wrote(path, "all figures"));
         }
+        let shown = self.html.is_some() || self.png.is_some();
+        let values = if shown { ShownValues::of_pair(source, target) } else { Default::default() };
         if let Some(path) = &self.html {
             begin(path);
-            let pair = page::of_outcome(outcome, source, target, initial, &self.page);
+            let pair = page::of_outcome(outcome, source, target, &values, initial, &self.page);
             files::write(path, page::html(pair, source, target).as_bytes())?;
             lines.push(wrote(path, "open it in a browser"));
         }
         if let Some(path) = &self.png {
             begin(path);
-            let pair = page::of_outcome(outcome, source, target, initial, &self.page);
+            let pair = page::of_outcome(outcome, source, target, &values, initial, &self.page);
             files::write(path, &page::png(&pair)?)?;
             lines.push(wrote(path, "a picture: before, after, and the distances that are left"));
         }

@@ -9,6 +9,7 @@ use srrf_view::Pose;
 use super::page::{self, PageArgs};
 use super::poses::{PoseReading, described, looks_inverted};
 use super::surface::{self, SurfaceArgs};
+use super::values::ShownValues;
 use srrf_args::flags::Common;
 use srrf_args::reading::PairReadFlags;
 use srrf_args::{Failure, Output, OutputKind, Places, files};
@@ -72,7 +73,8 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode, Failure> {
     let mut source = files::read(&args.source, None, args.read.source())?;
     let mut target = files::read(&args.target, None, args.read.target())?;
     let surfaces = args.surface.draw(&mut source, &mut target, true, 0)?;
-    let mut pair = args.page.pair(&source, &target);
+    let values = ShownValues::of_pair(&source, &target);
+    let mut pair = args.page.pair(&source, &target, &values);
     for (input, drawn) in [&source, &target].into_iter().zip(&surfaces) {
         if let Some(drawn) = drawn {
             pair = pair.warning(format!("{}: {}.", input.name, surface::text(drawn)));
