@@ -195,6 +195,11 @@ impl Progress {
         Self { shared, ticker: ticker.flatten() }
     }
 
+    /// A bar on a terminal; elsewhere a line each 10 seconds.
+    pub fn auto() -> Self {
+        ProgressArgs { progress: ProgressKind::Auto }.start(false)
+    }
+
     /// Nothing is shown.
     pub fn off() -> Self {
         Self::new(Look::Off)

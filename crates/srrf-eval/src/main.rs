@@ -3,9 +3,8 @@
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-use indicatif::{ProgressBar, ProgressStyle};
 use srrf_args::words::visible;
-use srrf_args::{Output, OutputLock, interrupt, run_program};
+use srrf_args::{Output, OutputLock, Progress, interrupt, run_program};
 use srrf_cloud::profile;
 use srrf_eval::tables::{self, TablesProgress};
 use srrf_eval::{
@@ -66,14 +65,15 @@ fn run(options: &EvalOptions) -> Result<(), EvalError> {
         say("weights: none are needed, since no method that learns is run");
     }
     weights.iter().for_each(|(name, weights)| say(&format!("weights of {name}: {weights}")));
+    let bar = Progress::auto();
     if let Some(path) = &options.export_pairs {
-        let bar = progress(pairs.as_ref(), "exporting");
-        srrf_eval::export(pairs.as_ref(), path, &mut || bar.inc(1))?;
-        bar.finish_and_clear();
+        bar.counted("exporting", count(pairs.as_ref()), "pairs");
+        srrf_eval::export(pairs.as_ref(), path, &mut || bar.advance(1))?;
+        bar.clear();
         say(&format!("pairs written to {}", path.display()));
     }
 
-    let bar = progress(pairs.as_ref(), "starting");
+    bar.counted("scoring", count(pairs.as_ref()), "pairs");
     let run = Run {
         pairs: pairs.as_ref(),
         methods: &set.methods,
@@ -82,18 +82,8 @@ fn run(options: &EvalOptions) -> Result<(), EvalError> {
         threads,
         cache: None,
     };
-    let mut tenths = 0;
-    let outcome = run.execute(&mut |done, group| {
-        bar.inc(done as u64);
-        bar.set_message(visible(group).into_owned());
-        // Where there is no terminal, a line after each tenth.
-        let now = 10 * bar.position() / bar.length().unwrap_or(1).max(1);
-        if bar.is_hidden() && now > tenths {
-            tenths = now;
-            say(&format!("{} of {} pairs, at {group}", bar.position(), bar.length().unwrap_or(0)));
-        }
-    })?;
-    bar.finish_and_clear();
+    let outcome = run.execute(&mut |done, _| bar.advance(done))?;
+    bar.clear();
 
     let summary = Summary::of(&outcome)?;
     let meta = Meta {
@@ -130,21 +120,20 @@ fn run(options: &EvalOptions) -> Result<(), EvalError> {
 
 /// The report of `srrf-eval tables`.
 fn make_tables(options: &TablesOptions) -> Result<(), EvalError> {
-    let bar = ProgressBar::new(0).with_style(bar_style());
+    let bar = Progress::auto();
     let written = tables::make(options, &mut |progress| match progress {
-        TablesProgress::Line(line) => say(line),
+        TablesProgress::Line(line) => {
+            bar.clear();
+            say(line);
+        }
         TablesProgress::Start(title, pairs) => {
-            bar.finish_and_clear();
+            bar.clear();
             say(&format!("{title}: {pairs} pairs"));
-            bar.reset();
-            bar.set_length(pairs as u64);
+            bar.counted(title, pairs, "pairs");
         }
-        TablesProgress::Done(pairs, group) => {
-            bar.inc(pairs as u64);
-            bar.set_message(visible(group).into_owned());
-        }
+        TablesProgress::Done(pairs, _) => bar.advance(pairs),
     })?;
-    bar.finish_and_clear();
+    bar.clear();
     say(&format!("written to {}: {}", options.out.display(), written.join(", ")));
     Ok(())
 }
@@ -159,15 +148,9 @@ fn open_pairs(options: &EvalOptions) -> Result<Box<dyn PairSource>, EvalError> {
     Ok(Box::new(SynthesizedPairs::new(shapes, protocol)?))
 }
 
-/// A bar on the terminal, if there is one.
-fn progress(pairs: &dyn PairSource, message: &'static str) -> ProgressBar {
-    let total = pairs.groups().iter().map(|g| g.pairs as u64).sum();
-    ProgressBar::new(total).with_style(bar_style()).with_message(message)
-}
-
-fn bar_style() -> ProgressStyle {
-    let template = "{msg:24} {wide_bar} {pos}/{len} pairs, {eta} left";
-    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+/// How many pairs there are.
+fn count(pairs: &dyn PairSource) -> usize {
+    pairs.groups().iter().map(|g| g.pairs).sum()
 }
 
 /// A line on standard output; a closed pipe is no reason to stop before the report is written.

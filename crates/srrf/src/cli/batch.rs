@@ -20,7 +20,7 @@ use super::scale::{self, ScaleArgs};
 use super::surface::SurfaceArgs;
 use super::values::ShownValues;
 use srrf_args::files::Input;
-use srrf_args::flags::{Common, Quiet, value};
+use srrf_args::flags::{Common, value};
 use srrf_args::reading::{PairReadFlags, described as described_reading};
 use srrf_args::words::{count, counted};
 use srrf_args::{Failure, Output, OutputKind, OutputLock, Places, Progress};
@@ -29,6 +29,7 @@ use srrf_args::{files, interrupt};
 mod csv;
 mod digest;
 mod list;
+mod merge;
 mod overview;
 mod pair;
 mod parquet_list;
@@ -41,6 +42,7 @@ mod table;
 
 use digest::Digest;
 use list::PairList;
+use merge::{MergeArgs, merge};
 use overview::Overview;
 use pair::ListedPair;
 use results::Results;
@@ -117,27 +119,6 @@ enum BatchVerb {
     Merge(MergeArgs),
 }
 
-/// Join results of several runs: each pair once; the extension of the output says the format.
-///
-/// Of two rows of one pair the one with a pose counts. Two different poses of one pair are an error.
-#[derive(Debug, Args)]
-struct MergeArgs {
-    /// The results
-    #[arg(required = true)]
-    results: Vec<PathBuf>,
-
-    /// Where they go together
-    #[arg(short, long, value_name = value::FILE)]
-    output: PathBuf,
-
-    /// The list whose order they get; pairs that are missing are counted
-    #[arg(long, value_name = value::FILE)]
-    list: Option<PathBuf>,
-
-    #[command(flatten)]
-    quiet: Quiet,
-}
-
 /// What results of a batch come to: counts, times, reliability, the slowest and the least probable pairs.
 #[derive(Debug, Args)]
 pub struct SummaryArgs {
@@ -161,24 +142,6 @@ fn digest_of(results: &std::path::Path) -> Result<Digest, Failure> {
         Ok(())
     })?;
     Ok(digest)
-}
-
-fn merge(args: &MergeArgs) -> Result<ExitCode, Failure> {
-    let mut places = Places::new().reads("--list", args.list.as_deref());
-    for results in &args.results {
-        places = places.reads("the results", &**results);
-    }
-    places.writes("--output", &*args.output, RESULTS)?.check()?;
-    let _lock = OutputLock::take(&args.output)?;
-    let listed = args.list.as_deref().map(PairList::read).transpose()?;
-    let ids: Vec<&str> = listed.iter().flat_map(|list| &list.rows).map(|pair| &*pair.id).collect();
-    let pairs = results::join(&args.results, &ids, &args.output)?;
-    let out = Output::new(args.quiet.quiet, false);
-    out.say(&format!("{} in {}", counted(pairs, "pair"), args.output.display()));
-    if listed.is_some() && pairs < ids.len() {
-        out.say(&format!("{} of the list are missing: run their shards", counted(ids.len() - pairs, "pair")));
-    }
-    Ok(ExitCode::SUCCESS)
 }
 
 /// Registers all pairs.

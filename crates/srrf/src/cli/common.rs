@@ -48,7 +48,9 @@ pub fn failed(error: srrf::Error, source: &str, target: &str) -> Failure {
         srrf::Error::Target(e) => Failure::cloud(target, &e),
         srrf::Error::Weights(_) | srrf::Error::Device(_) | srrf::Error::Calibration(_) => unusable(error),
         srrf::Error::Scale(doubt) => Failure::usage(format!(
-            "{source:?} and {target:?} seem to be in different units of length: {doubt}"
+            "{source:?} and {target:?} seem to be in different units of length: {doubt}{}{}",
+            stated_unit(source),
+            stated_unit(target)
         )),
         srrf::Error::Copy(e) => Failure::other(e),
         srrf::Error::Stopped => Failure::other(error),
@@ -59,10 +61,31 @@ pub fn failed(error: srrf::Error, source: &str, target: &str) -> Failure {
     }
 }
 
+/// What the format of a file says of its unit of length, for a message.
+fn stated_unit(name: &str) -> String {
+    let extension =
+        std::path::Path::new(name).extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    match extension.split('#').next() {
+        Some("e57" | "glb" | "gltf") => format!("; files such as {name:?} are in metres by their format"),
+        _ => String::new(),
+    }
+}
+
 /// The warnings about a file: points that were left out, and what is to be known of its reading.
 pub fn warnings_of(input: &Input) -> Vec<Warning> {
     let cloud = || input.name.clone();
     let left_out = (input.dropped > 0).then(|| Warning::LeftOut { cloud: cloud(), points: input.dropped });
     let notes = input.notes.iter().map(|note| Warning::Reading { cloud: cloud(), note: note.clone() });
     left_out.into_iter().chain(notes).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formats_that_state_their_unit() {
+        assert!(stated_unit("a/b.E57#2").contains("in metres by their format"));
+        assert_eq!(stated_unit("part.stl"), "");
+    }
 }

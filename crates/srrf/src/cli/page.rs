@@ -38,9 +38,14 @@ impl PageArgs {
         let mut pair = Pair::new(title(source, target), &source.cloud, &target.cloud)
             .unit(&*self.unit)
             .values(values[0].shown(), values[1].shown());
-        // The frame of a depth camera: y down, z forward.
+        // The frame of a depth camera: y down, z forward. glTF says that y is up.
         let camera = target.grid.is_some() && target.cloud.points().iter().all(|p| p[2] > 0.0);
-        if let Some(up) = self.up.or(camera.then_some(Up::MinusY)) {
+        let known = if camera {
+            Some(Up::MinusY)
+        } else {
+            matches!(target.file.format(), "gltf" | "glb").then_some(Up::Y)
+        };
+        if let Some(up) = self.up.or(known) {
             pair = pair.up(up);
         }
         for input in [source, target] {
