@@ -3,7 +3,6 @@
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-use srrf_args::words::visible;
 use srrf_args::{Output, OutputLock, Progress, interrupt, run_program};
 use srrf_cloud::profile;
 use srrf_eval::tables::{self, TablesProgress};
