@@ -8,6 +8,9 @@ use srrf_cloud::pose::{PoseFile, PoseFormat, PoseNote, QuaternionOrder};
 pub const FORMATS: [&str; 12] =
     ["ply", "pcd", "xyz", "npy", "npz", "obj", "off", "stl", "kitti", "las", "laz", "e57"];
 
+/// Those that came later, of which the corpus holds nothing yet.
+pub const NEWER: [&str; 8] = ["ptx", "pts", "vtk", "vtp", "glb", "gltf", "mcap", "parquet"];
+
 /// Reads `bytes` as `format` (or as what they look like). Where that gives points, a copy that does
 /// not move holds the same ones, and a copy that moves holds as many.
 ///

@@ -58,6 +58,7 @@ impl ReadFlags {
             message: self.message,
             keep_zeros: self.keep_zeros,
             max_memory: self.max_memory,
+            folder: None,
         }
     }
 }
@@ -100,6 +101,7 @@ macro_rules! of_one_cloud {
                     message: self.message.or(both.message),
                     keep_zeros: both.keep_zeros,
                     max_memory: both.max_memory,
+                    folder: None,
                 }
             }
         }
@@ -154,7 +156,8 @@ impl PairReadFlags {
 
 /// What was asked, in words that stay the same: each option that is set, as `name=value`.
 pub fn described(options: &ReadOptions) -> Vec<String> {
-    let ReadOptions { columns, array, layout, scan, topic, message, keep_zeros, max_memory: _ } = options;
+    let ReadOptions { columns, array, layout, scan, topic, message, keep_zeros, max_memory: _, folder: _ } =
+        options;
     [
         columns.as_ref().map(|v| format!("columns={v}")),
         array.as_ref().map(|v| format!("array={v}")),

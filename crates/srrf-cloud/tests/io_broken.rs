@@ -186,7 +186,7 @@ fn broken(sample: &Sample, seed: u64) -> Vec<(String, Vec<u8>)> {
     all
 }
 
-#[cfg(any(feature = "las", feature = "e57"))]
+#[cfg(any(feature = "las", feature = "e57", feature = "parquet"))]
 fn written(format: &'static str) -> Sample {
     let cloud = srrf_cloud::PointCloud::new(POINTS.to_vec()).unwrap();
     let mut bytes = Vec::new();
@@ -204,6 +204,8 @@ fn broken_files_are_errors_and_take_bounded_memory() {
     all.extend([written("las"), written("laz")]);
     #[cfg(feature = "e57")]
     all.push(written("e57"));
+    #[cfg(feature = "parquet")]
+    all.push(written("parquet"));
     let (mut files, mut errors) = (0, 0);
     for (seed, sample) in all.iter().enumerate() {
         let cases = broken(sample, seed as u64);

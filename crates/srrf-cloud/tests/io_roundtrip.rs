@@ -12,7 +12,7 @@ use srrf_cloud::io::{CloudFile, Kept, write_cloud_to};
 use srrf_cloud::{PointCloud, Rigid};
 
 /// Formats that hold any number.
-const LOSSLESS: [&str; 7] = ["ply", "pcd", "npy", "npz", "off", "obj", "xyz"];
+const LOSSLESS: [&str; 10] = ["ply", "pcd", "npy", "npz", "off", "obj", "xyz", "pts", "vtk", "vtp"];
 
 fn open(bytes: &[u8], format: &str) -> CloudFile {
     CloudFile::from_reader(&mut &bytes[..], Some(format)).unwrap()
@@ -49,7 +49,11 @@ fn what_is_written_reads_back_as_the_same_bits() {
     for seed in 0..20 {
         for points in clouds(seed) {
             let cloud = PointCloud::new(points.clone()).unwrap();
-            for format in LOSSLESS.into_iter().chain(cfg!(feature = "e57").then_some("e57")) {
+            for format in LOSSLESS
+                .into_iter()
+                .chain(cfg!(feature = "e57").then_some("e57"))
+                .chain(cfg!(feature = "parquet").then_some("parquet"))
+            {
                 let mut bytes = Vec::new();
                 write_cloud_to(&mut bytes, format, &cloud).unwrap();
                 assert!(same_bits(&open(&bytes, format).points().unwrap(), &points), "{format}, seed {seed}");
@@ -83,6 +87,11 @@ fn without_repeats(points: &[[f64; 3]]) -> Vec<[f64; 3]> {
     kept
 }
 
+/// All samples of formats that are written too.
+fn written(points: &[[f64; 3]]) -> impl Iterator<Item = Sample> {
+    samples(points).into_iter().filter(|sample| sample.format != "mcap")
+}
+
 fn expected(sample: &Sample) -> Vec<[f64; 3]> {
     if sample.format == "stl" { without_repeats(&sample.points) } else { sample.points.clone() }
 }
@@ -107,7 +116,7 @@ fn every_flavour_is_read_exactly_and_recognised() {
 #[test]
 fn a_copy_that_does_not_move_is_the_same_file() {
     for points in clouds(3) {
-        for sample in samples(&points) {
+        for sample in written(&points) {
             let mut copy = Vec::new();
             let kept =
                 open(&sample.bytes, sample.format).write_transformed_to(&mut copy, None, &Rigid::identity());
@@ -128,7 +137,7 @@ fn a_moved_copy_is_exact() {
         translation: [500_000.0, -20.0, 0.125].into(),
     };
     let map = clouds(5).remove(2);
-    for sample in samples(&map) {
+    for sample in written(&map) {
         let file = open(&sample.bytes, sample.format);
         let wanted: Vec<[f64; 3]> = expected(&sample).iter().map(|p| motion.apply(p)).collect();
         let mut copy = Vec::new();

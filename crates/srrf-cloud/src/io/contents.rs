@@ -109,6 +109,16 @@ pub enum Note {
     },
     /// The first line is a title of numbers: 0, 1, 2 and so on, as pandas writes it for columns without names.
     NumberedTitle,
+    /// Several scans were read as one cloud, each where its pose says.
+    Merged {
+        /// How many.
+        scans: usize,
+    },
+    /// Points of a mesh that are no corner of a triangle.
+    LoosePoints {
+        /// How many.
+        points: usize,
+    },
     /// An array of other than two axes was read as a list of points.
     Flattened {
         /// Its shape.
@@ -136,6 +146,15 @@ impl fmt::Display for Note {
             ),
             Self::NumberedTitle => {
                 f.write_str("the first line, 0, 1, 2 and so on, was taken for a title and not for a point")
+            }
+            Self::Merged { scans } => {
+                write!(
+                    f,
+                    "{scans} scans as one cloud, each where its pose says; `FILE#2` is the second alone"
+                )
+            }
+            Self::LoosePoints { points } => {
+                write!(f, "{points} points are no corner of a triangle, and so no part of the surface")
             }
             Self::Flattened { shape } => write!(f, "an array of shape {shape:?}, read as a list of points"),
         }

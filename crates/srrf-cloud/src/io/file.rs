@@ -10,7 +10,13 @@ use super::{Kept, Outgoing, write_atomically};
 use crate::{CloudError, PointCloud, Rigid};
 
 /// Formats that need a cargo feature of the same name, and the extensions of their files.
-const OPTIONAL: &[(&str, &[&str])] = &[("las", &["las", "laz"]), ("e57", &["e57"])];
+const OPTIONAL: &[(&str, &[&str])] = &[
+    ("las", &["las", "laz"]),
+    ("e57", &["e57"]),
+    ("gltf", &["glb", "gltf"]),
+    ("mcap", &["mcap"]),
+    ("parquet", &["parquet", "pq"]),
+];
 
 /// The names of all formats of this build, for help texts.
 pub fn format_names() -> Vec<&'static str> {
@@ -47,6 +53,7 @@ impl CloudFile {
             path = file;
             options.scan = Some(*number);
         }
+        options.folder = path.parent().map(Path::to_owned);
         let known = format_of(path);
         if let Err(left_out @ IoError::LeftOut { .. }) = known {
             return Err(left_out);
@@ -123,6 +130,11 @@ impl CloudFile {
     /// As [`contents`](Self::contents).
     pub fn points(&self) -> Result<Vec<[f64; 3]>, IoError> {
         Ok(self.contents()?.points)
+    }
+
+    /// Whether files of this format may hold several scans.
+    pub fn holds_scans(&self) -> bool {
+        self.format.holds_scans()
     }
 
     /// The scans of the file, one or more; whichever of them the options name.
@@ -385,7 +397,13 @@ fn detect(path: &Path, bytes: &[u8]) -> Result<&'static dyn CloudFormat, IoError
     if let Some(format) = FORMATS.iter().find(|format| format.recognises(bytes)) {
         return Ok(*format);
     }
-    for (magic, format) in [(&b"LASF"[..], "las"), (b"ASTM-E57", "e57")] {
+    for (magic, format) in [
+        (&b"LASF"[..], "las"),
+        (b"ASTM-E57", "e57"),
+        (b"glTF", "gltf"),
+        (b"\x89MCAP0", "mcap"),
+        (b"PAR1", "parquet"),
+    ] {
         if bytes.starts_with(magic) {
             return Err(IoError::LeftOut { path: path.to_owned(), format });
         }

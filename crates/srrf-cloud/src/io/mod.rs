@@ -23,9 +23,13 @@ mod contents;
 mod e57;
 mod error;
 mod file;
+#[cfg(feature = "gltf")]
+mod gltf;
 mod kitti;
 #[cfg(feature = "las")]
 mod las;
+#[cfg(feature = "mcap")]
+mod mcap;
 mod memory;
 mod npy;
 mod npz;
@@ -34,13 +38,19 @@ mod obj;
 pub mod off;
 mod options;
 mod outgoing;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod pcd;
 mod ply;
+mod pts;
+mod ptx;
 mod scalar;
 mod scan;
+mod scans;
 mod single;
 mod stl;
 mod text;
+mod vtk;
 
 pub use arrays::{ArrayError, NpzArrays, read_npy, read_npz};
 pub use atomic::{place_of, remove_left_overs, write_atomically};
@@ -180,6 +190,20 @@ pub static FORMATS: &[&dyn CloudFormat] = &[
     &las::Laz,
     #[cfg(feature = "e57")]
     &e57::E57,
+    #[cfg(feature = "gltf")]
+    &gltf::GLB,
+    #[cfg(feature = "gltf")]
+    &gltf::GLTF,
+    #[cfg(feature = "mcap")]
+    &mcap::Mcap,
+    #[cfg(feature = "parquet")]
+    &parquet::Parquet,
+    &vtk::Vtk,
+    &vtk::VTP,
+    &vtk::VTU,
+    &vtk::VTS,
+    &ptx::Ptx,
+    &pts::Pts,
     &text::Text,
 ];
 

@@ -1,6 +1,7 @@
 //! [`ReadOptions`]: how a file is to be read where it does not say so itself.
 
 use std::fmt;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use super::FormatError;
@@ -24,6 +25,9 @@ pub struct ReadOptions {
     pub message: Option<usize>,
     /// Whether points at exactly 0, 0, 0 stay although they lie there in a pile, which stands for "no return".
     pub keep_zeros: bool,
+    /// Folder of the file, where those lie that it names (the buffers of a `.gltf`); [`CloudFile`](super::CloudFile)
+    /// knows it.
+    pub folder: Option<PathBuf>,
     /// Most bytes of memory that reading may take, the file's own included; half of the machine's without it.
     pub max_memory: Option<u64>,
 }

@@ -15,7 +15,9 @@ fn cloud() -> PointCloud {
 fn every_format_gives_back_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
     // The others hold less, and their own tests say how much less.
-    let lossless = FORMATS.iter().filter(|f| !["stl", "kitti", "las", "laz"].contains(&f.name()));
+    let lossless = FORMATS
+        .iter()
+        .filter(|f| !["stl", "kitti", "las", "laz", "glb", "gltf", "mcap", "ptx", "vts"].contains(&f.name()));
     let extensions: Vec<&str> = lossless.flat_map(|f| f.extensions()).copied().collect();
     for extension in &extensions {
         for name in [format!("a.{extension}"), format!("b.{}", extension.to_uppercase())] {

@@ -4,6 +4,7 @@
 #![allow(dead_code, reason = "each test uses its part")]
 
 mod binary;
+mod newer;
 mod text;
 
 /// A file, what it holds, and where its body begins.
@@ -41,6 +42,7 @@ pub fn single(points: &[[f64; 3]]) -> Vec<[f64; 3]> {
 pub fn samples(points: &[[f64; 3]]) -> Vec<Sample> {
     let mut all = text::samples(points);
     all.extend(binary::samples(points));
+    all.extend(newer::samples(points));
     all
 }
 

@@ -7,8 +7,9 @@ use std::process::ExitCode;
 use clap::Args;
 use serde_json::{Value, json};
 use srrf_cloud::Solid;
-use srrf_cloud::io::ReadOptions;
+use srrf_cloud::io::{CloudFile, ReadOptions, ScanEntry};
 
+use super::scans;
 use super::statistics::Statistics;
 use srrf_args::Failure;
 use srrf_args::Output;
@@ -49,11 +50,8 @@ pub fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
         let inspected = inspect(path, args.read.options());
         progress.clear();
         match inspected {
-            Ok((input, statistics)) if args.json => values.push(to_json(&input, &statistics)),
-            Ok((input, statistics)) => {
-                let out = Output::new(args.common.quiet.quiet, false);
-                out.say(to_text(&input, &statistics).trim_end());
-            }
+            Ok(found) if args.json => values.push(found.to_json()),
+            Ok(found) => Output::new(args.common.quiet.quiet, false).say(found.to_text().trim_end()),
             Err(failure) => {
                 if args.json {
                     values.push(json!({ "file": path.display().to_string(), "error": failure.to_string() }));
@@ -68,10 +66,55 @@ pub fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
     if failures.is_empty() { Ok(ExitCode::SUCCESS) } else { Err(Failure::usage(failures.join("\nerror: "))) }
 }
 
-fn inspect(path: &Path, options: ReadOptions) -> Result<(Input, Statistics), Failure> {
-    let input = files::read(path, None, options)?;
+/// What is known of a file.
+enum Found {
+    /// A cloud, and the scans that it is made of if they are several.
+    Cloud(Box<Input>, Statistics, Vec<ScanEntry>),
+    /// Several scans that are no one cloud.
+    Scans(CloudFile, Vec<ScanEntry>),
+}
+
+fn inspect(path: &Path, options: ReadOptions) -> Result<Found, Failure> {
+    let input = match files::read(path, None, options.clone()) {
+        Ok(input) => input,
+        Err(failure) => {
+            let (file, scans) = scans::of_path(path, options).ok_or(failure)?;
+            return Ok(Found::Scans(file, scans));
+        }
+    };
     let statistics = Statistics::new(&input.cloud).map_err(|e| Failure::cloud(&input.name, &e))?;
-    Ok((input, statistics))
+    let several = scans::several(&input.file);
+    Ok(Found::Cloud(Box::new(input), statistics, several))
+}
+
+impl Found {
+    fn to_json(&self) -> Value {
+        let (mut value, several) = match self {
+            Self::Cloud(input, statistics, several) => (to_json(input, statistics), several),
+            Self::Scans(file, scans) => {
+                (json!({ "file": file.path().display().to_string(), "format": file.format() }), scans)
+            }
+        };
+        if let Value::Object(map) = &mut value
+            && !several.is_empty()
+        {
+            map.insert("scans".into(), scans::to_json(several));
+        }
+        value
+    }
+
+    fn to_text(&self) -> String {
+        let (mut out, several) = match self {
+            Self::Cloud(input, statistics, several) => (to_text(input, statistics), several),
+            Self::Scans(file, scans) => (format!("{}: {}\n", file.path().display(), file.format()), scans),
+        };
+        for (index, line) in scans::in_words(several).into_iter().enumerate() {
+            let label = if index == 0 { "scans" } else { "" };
+            // Writing to a string cannot fail.
+            let _ = writeln!(out, "  {label:10} {line}");
+        }
+        out
+    }
 }
 
 fn to_json(input: &Input, statistics: &Statistics) -> Value {

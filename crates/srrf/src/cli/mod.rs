@@ -24,6 +24,7 @@ mod poses;
 mod register;
 mod rrd;
 mod scale;
+mod scans;
 mod skeleton;
 mod statistics;
 mod summary;

@@ -6,14 +6,14 @@ mod poses;
 use std::io::{self, Cursor, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use e57::{E57Reader, E57Writer, Record, RecordDataType, RecordName, RecordValue};
+use e57::{E57Reader, E57Writer, PointCloud, Record, RecordDataType, RecordName, RecordValue};
 use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::{CloudFormat, Contents, FormatError, ReadOptions};
+use super::{CloudFormat, Contents, FormatError, Note, ReadOptions, ScanEntry};
 use crate::Rigid;
 
-/// E57 files. The points of all scans are read, each scan moved by its pose into the coordinates of
-/// the file; points that the scanner marks as invalid are NaN. Written as one scan in double
+/// E57 files. The points of all scans are read, or of one of them, each scan moved by its pose into the
+/// coordinates of the file; points that the scanner marks as invalid are NaN. Written as one scan in double
 /// precision. A moved copy changes only the poses of scans and images, in double precision; all
 /// else stays byte for byte.
 pub(super) struct E57;
@@ -36,6 +36,21 @@ impl CloudFormat for E57 {
         guarded(|| read(bytes, options))
     }
 
+    fn holds_scans(&self) -> bool {
+        true
+    }
+
+    fn scans(&self, bytes: &[u8], _options: &ReadOptions) -> Result<Vec<ScanEntry>, FormatError> {
+        pages::check(bytes)?;
+        let scans = guarded(|| Ok(E57Reader::new(Cursor::new(bytes))?.pointclouds()))?;
+        let entry = |scan: &PointCloud| ScanEntry {
+            name: scan.name.clone().unwrap_or_default(),
+            points: scan.records,
+            pose: pose(scan),
+        };
+        Ok(scans.iter().map(entry).collect())
+    }
+
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&guarded(|| file(points))?)
     }
@@ -53,7 +68,7 @@ impl CloudFormat for E57 {
             return out.write_all(bytes);
         }
         let xml = guarded(|| Ok(E57Reader::new(Cursor::new(bytes))?.xml().to_owned()))?;
-        out.write_all(&pages::with_xml(bytes, &poses::moved(&xml, motion)?)?)
+        out.write_all(&pages::with_xml(bytes, &poses::moved(&xml, motion, options.scan)?)?)
     }
 }
 
@@ -84,7 +99,14 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, E57Problem>) -> Result<T, FormatE
 fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, E57Problem> {
     let mut reader = E57Reader::new(Cursor::new(bytes))?;
     let mut points = Vec::new();
-    for scan in reader.pointclouds() {
+    let scans = reader.pointclouds();
+    let count = scans.len();
+    if let Some(number) = options.scan.filter(|&number| number == 0 || number > count) {
+        return Err(E57Problem::Format(super::scans::no_such_scan(number, count)));
+    }
+    let wanted = |index: usize| options.scan.is_none_or(|number| number == index + 1);
+    let (mut viewpoint, mut single) = (None, true);
+    for (_, scan) in scans.into_iter().enumerate().filter(|(index, _)| wanted(*index)) {
         let bits = scan.prototype.iter().map(|record| u128::from(bits(&record.data_type))).sum::<u128>();
         if scan.records > 0 && (bits == 0 || bits * u128::from(scan.records) > 8 * bytes.len() as u128) {
             let announced = format!("{} points of {bits} bits", scan.records);
@@ -96,20 +118,30 @@ fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, E57Problem> {
         let more = usize::try_from(scan.records).unwrap_or(usize::MAX);
         options.check_points(bytes.len(), points.len().saturating_add(more)).map_err(E57Problem::Format)?;
         let columns = XyzColumns::of(&scan.prototype).map_err(E57Problem::Format)?;
-        let pose = scan.transform.as_ref().map(|pose| {
-            let (q, t) = (&pose.rotation, &pose.translation);
-            let rotation = UnitQuaternion::from_quaternion(Quaternion::new(q.w, q.x, q.y, q.z));
-            Rigid {
-                rotation: rotation.to_rotation_matrix().into_inner(),
-                translation: [t.x, t.y, t.z].into(),
-            }
-        });
+        let pose = pose(&scan);
+        viewpoint = pose.as_ref().map(|pose| pose.translation.into());
+        single &= pose.is_none() && columns.single(&scan.prototype);
         for values in reader.pointcloud_raw(&scan)? {
             let point = columns.point(&values?, &scan.prototype);
             points.push(pose.as_ref().map_or(point, |pose| pose.apply(&point)));
         }
     }
-    Ok(Contents::of_points(points))
+    let merged = options.scan.is_none() && count > 1;
+    Ok(Contents {
+        single: single && !points.is_empty(),
+        points,
+        viewpoint: viewpoint.filter(|_| !merged),
+        notes: if merged { vec![Note::Merged { scans: count }] } else { Vec::new() },
+        ..Contents::default()
+    })
+}
+
+/// Where a scan stood, if the file says so.
+fn pose(scan: &PointCloud) -> Option<Rigid> {
+    let pose = scan.transform.as_ref()?;
+    let (q, t) = (&pose.rotation, &pose.translation);
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(q.w, q.x, q.y, q.z));
+    Some(Rigid { rotation: rotation.to_rotation_matrix().into_inner(), translation: [t.x, t.y, t.z].into() })
 }
 
 /// Bits of a number in the file.
@@ -147,6 +179,12 @@ impl XyzColumns {
             FormatError::Content("a scan has neither Cartesian nor spherical coordinates".into())
         })?;
         Ok(Self { axes, spherical: true, invalid: find(RecordName::SphericalInvalidState) })
+    }
+
+    /// Whether the file holds them in single precision, as they are.
+    fn single(&self, prototype: &[Record]) -> bool {
+        let kinds = self.axes.map(|axis| prototype.get(axis).map(|record| &record.data_type));
+        !self.spherical && kinds.iter().all(|kind| matches!(kind, Some(RecordDataType::Single { .. })))
     }
 
     fn point(&self, values: &[RecordValue], prototype: &[Record]) -> [f64; 3] {

@@ -7,19 +7,20 @@ use super::super::FormatError;
 use super::super::scan::put_number;
 use crate::Rigid;
 
-/// The XML with each pose `p` replaced by `motion` after `p`; scans without pose get one.
+/// The XML with each pose `p` replaced by `motion` after `p`; scans without pose get one. With the number of a scan,
+/// from 1, that scan alone moves.
 ///
 /// # Errors
 /// [`FormatError`] where it is not XML, or a pose is not made of numbers.
-pub(super) fn moved(xml: &str, motion: &Rigid) -> Result<String, FormatError> {
+pub(super) fn moved(xml: &str, motion: &Rigid, scan: Option<usize>) -> Result<String, FormatError> {
     let document =
         Document::parse(xml).map_err(|e| FormatError::Content(format!("the XML section is damaged: {e}")))?;
     let mut changes = Vec::new();
     for (list, always) in [("data3D", true), ("images2D", false)] {
         let lists = document.root_element().children().filter(|node| node.tag_name().name() == list);
-        for item in
-            lists.flat_map(|list| list.children()).filter(|node| node.tag_name().name() == "vectorChild")
-        {
+        let items = lists.flat_map(|list| list.children());
+        let items = items.filter(|node| node.tag_name().name() == "vectorChild").enumerate();
+        for (_, item) in items.filter(|(index, _)| scan.is_none_or(|scan| always && scan == index + 1)) {
             match item.children().find(|node| node.tag_name().name() == "pose") {
                 Some(pose) => changes.push((pose.range(), text(&motion.compose(&read(&pose)?)))),
                 None if always => {

@@ -61,3 +61,61 @@ fn damage_is_found() {
         assert!(points_of(&E57, &pages::with_xml(&bytes, &xml.replace(from, to)).unwrap()).is_err());
     }
 }
+
+/// Two scans, the second of them turned by 90 degrees about z and moved.
+fn two_scans() -> Vec<u8> {
+    let mut out = Cursor::new(Vec::new());
+    let mut writer = E57Writer::new(&mut out, "{00000000-0000-4000-8000-000000000000}").unwrap();
+    let kind = RecordDataType::Double { min: None, max: None };
+    for number in 0..2 {
+        let names = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
+        let prototype = names.map(|name| Record { name, data_type: kind.clone() }).to_vec();
+        let id = format!("{{00000000-0000-4000-8000-00000000001{number}}}");
+        let mut scan = writer.add_pointcloud(&id, prototype).unwrap();
+        scan.set_name(Some(format!("station {number}")));
+        if number == 1 {
+            let half = std::f64::consts::FRAC_1_SQRT_2;
+            scan.set_transform(Some(e57::Transform {
+                rotation: e57::Quaternion { w: half, x: 0.0, y: 0.0, z: half },
+                translation: e57::Translation { x: 10.0, y: 20.0, z: 30.0 },
+            }));
+        }
+        for x in 1..=number + 2 {
+            scan.add_point([f64::from(x), 0.0, 0.5].map(RecordValue::Double).to_vec()).unwrap();
+        }
+        scan.finalize().unwrap();
+    }
+    writer.finalize().unwrap();
+    drop(writer);
+    out.into_inner()
+}
+
+#[test]
+fn one_scan_of_several() {
+    let bytes = two_scans();
+    let near = |points: &[[f64; 3]], expected: &[[f64; 3]]| {
+        assert_eq!(points.len(), expected.len());
+        let pairs = points.iter().flatten().zip(expected.iter().flatten());
+        assert!(pairs.clone().all(|(a, b)| (a - b).abs() < 1e-12), "{points:?} {expected:?}");
+    };
+    let all = E57.read(&bytes, &ReadOptions::default()).unwrap();
+    assert!(!all.single, "double precision");
+    assert_eq!((all.points.len(), all.notes, all.viewpoint), (5, vec![Note::Merged { scans: 2 }], None));
+    let second = E57.read(&bytes, &ReadOptions::default().of_scan(2)).unwrap();
+    near(&second.points, &[[10.0, 21.0, 30.5], [10.0, 22.0, 30.5], [10.0, 23.0, 30.5]]);
+    assert_eq!((second.viewpoint, second.notes), (Some([10.0, 20.0, 30.0]), vec![]));
+    near(&all.points[2..], &second.points);
+    let error = E57.read(&bytes, &ReadOptions::default().of_scan(3)).unwrap_err().to_string();
+    assert!(error.contains("scan 3") && error.contains("2 scans"), "{error}");
+    let scans = E57.scans(&bytes, &ReadOptions::default()).unwrap();
+    let facts: Vec<_> =
+        scans.iter().map(|scan| (scan.name.as_str(), scan.points, scan.pose.is_some())).collect();
+    assert_eq!(facts, [("station 0", 2, false), ("station 1", 3, true)]);
+
+    let motion = Rigid { translation: [100.0, 0.0, 0.0].into(), ..Rigid::identity() };
+    let mut copy = Vec::new();
+    E57.rewrite(&bytes, &ReadOptions::default().of_scan(2), &motion, &mut copy).unwrap();
+    let moved = E57.read(&copy, &ReadOptions::default()).unwrap().points;
+    near(&moved[..2], &all.points[..2]);
+    near(&moved[2..3], &[[110.0, 21.0, 30.5]]);
+}

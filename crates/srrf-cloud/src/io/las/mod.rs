@@ -274,3 +274,6 @@ fn rewritten(bytes: &[u8], options: &ReadOptions, motion: &Rigid) -> io::Result<
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod versions;

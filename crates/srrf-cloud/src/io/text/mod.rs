@@ -26,7 +26,7 @@ impl CloudFormat for Text {
     }
 
     fn extensions(&self) -> &[&'static str] {
-        &["xyz", "txt", "csv", "pts"]
+        &["xyz", "txt", "csv"]
     }
 
     fn recognises(&self, bytes: &[u8]) -> bool {

@@ -1,0 +1,111 @@
+//! Parquet, the format of tables in columns, by the `parquet` crate.
+
+mod columns;
+mod table;
+mod thrift;
+mod write;
+
+use std::io::{self, Write};
+
+use arrow_schema::DataType;
+
+use self::columns::Place;
+use self::table::Table;
+use super::scalar::Scalar;
+use super::{Attribute, CloudFormat, Contents, FormatError, ReadOptions};
+use crate::Rigid;
+
+/// Parquet files. The points are the columns x, y and z of any type of numbers, or a column of lists
+/// or structures of three numbers; missing numbers are NaN. Written with the columns x, y and z in
+/// double precision. A moved copy keeps all other columns; nx, ny and nz are turned.
+pub(super) struct Parquet;
+
+fn read(bytes: &[u8], options: &ReadOptions) -> Result<(Table, Place, Vec<[f64; 3]>), FormatError> {
+    let table = Table::open(bytes, options)?;
+    let place = columns::find(table.metadata.schema(), options.columns.as_ref())?;
+    options.check_points(2 * bytes.len(), table.rows())?;
+    let mut points = Vec::new();
+    table.batches(&place.roots(), options, |batch| columns::points(&place, batch.columns(), &mut points))?;
+    Ok((table, place, points))
+}
+
+impl CloudFormat for Parquet {
+    fn name(&self) -> &'static str {
+        "parquet"
+    }
+
+    fn extensions(&self) -> &[&'static str] {
+        &["parquet", "pq"]
+    }
+
+    fn recognises(&self, bytes: &[u8]) -> bool {
+        bytes.starts_with(b"PAR1")
+    }
+
+    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
+        let (table, place, points) = read(bytes, options)?;
+        let kinds = place.roots();
+        let single =
+            kinds.iter().all(|&column| columns::is_single(table.metadata.schema().field(column).data_type()));
+        Ok(Contents { points, single, ..Contents::default() })
+    }
+
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        let table = Table::open(bytes, options)?;
+        let place = columns::find(table.metadata.schema(), options.columns.as_ref())?;
+        let coordinates = place.roots();
+        let mut attributes = Vec::new();
+        for (column, field) in table.metadata.schema().fields().iter().enumerate() {
+            let kind = match field.data_type() {
+                DataType::Int8 => Scalar::I8,
+                DataType::UInt8 => Scalar::U8,
+                DataType::Int16 => Scalar::I16,
+                DataType::UInt16 => Scalar::U16,
+                DataType::Int32 => Scalar::I32,
+                DataType::UInt32 => Scalar::U32,
+                DataType::Int64 => Scalar::I64,
+                DataType::UInt64 => Scalar::U64,
+                DataType::Float16 | DataType::Float32 => Scalar::F32,
+                DataType::Float64 => Scalar::F64,
+                _ => continue,
+            };
+            if coordinates.contains(&column) {
+                continue;
+            }
+            let mut values = Vec::new();
+            let mut missing = false;
+            table.batches(&[column], options, |batch| {
+                let array = batch.column(0);
+                missing |= array.null_count() > 0;
+                values.extend(columns::numbers(array)?);
+                Ok(())
+            })?;
+            // Integers have no way to say that one is missing.
+            let kind = if missing && !matches!(kind, Scalar::F32) { Scalar::F64 } else { kind };
+            let values = super::scans::attribute_values(kind, values.into_iter());
+            attributes.push(Attribute { name: field.name().to_lowercase(), values });
+        }
+        Ok(attributes)
+    }
+
+    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&write::file(points)?)
+    }
+
+    fn rewrite(
+        &self,
+        bytes: &[u8],
+        options: &ReadOptions,
+        motion: &Rigid,
+        out: &mut dyn Write,
+    ) -> io::Result<()> {
+        let (table, place, points) = read(bytes, options)?;
+        if *motion == Rigid::identity() {
+            return out.write_all(bytes);
+        }
+        out.write_all(&write::rewritten(&table, options, &place, &points, motion)?)
+    }
+}
+
+#[cfg(test)]
+mod tests;
