@@ -113,7 +113,7 @@ fn scan_header<'a>(
     let translation = Vector3::new(matrix[3][0], matrix[3][1], matrix[3][2]);
     let off = (rotation * rotation.transpose() - Matrix3::identity()).abs().max();
     let projective = (0..3).any(|row| matrix[row][3] != 0.0) || matrix[3][3] != 1.0;
-    let finite = translation.iter().all(|value| value.is_finite());
+    let finite = translation.iter().chain(rotation.iter()).all(|value| value.is_finite());
     if !(off <= TOLERANCE && rotation.determinant() > 0.0 && finite) || projective {
         let hint = if (0..3).any(|row| matrix[row][3] != 0.0) {
             "; its translation belongs in the last line, not in the last column"

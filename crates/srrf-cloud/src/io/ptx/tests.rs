@@ -76,6 +76,7 @@ fn what_is_wrong_is_said_with_its_line() {
         points_of(&Ptx, TWO.replacen(from, to, 1).as_bytes()).unwrap_err().to_string()
     };
     assert!(error("1 0 0 0\n0 1 0 0", "2 0 0 0\n0 1 0 0").contains("no rotation"));
+    assert!(error("1 0 0 0\n0 1 0 0", "1e999 0 0 0\n0 1 0 0").contains("no rotation"), "fuzzing found it");
     assert!(error("1 0 0 0\n", "1 0 0 7\n").contains("last line"));
     assert!(error("7 8 9 1", "7 8 nine 1").starts_with("line 14: \"nine\""));
     assert!(error("7 8 9 1", "7 8").starts_with("line 14: 2 numbers"));
