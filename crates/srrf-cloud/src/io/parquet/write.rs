@@ -9,6 +9,7 @@ use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
 
+use super::super::outgoing::stays_single;
 use super::super::scalar::Scalar;
 use super::super::scan::{moved, turned};
 use super::super::{FormatError, ReadOptions};
@@ -80,9 +81,11 @@ pub(super) fn rewritten(
     let old = table.metadata.schema();
     let kind = |column: usize| old.field(column).data_type().clone();
     let new: Vec<[f64; 3]> = points.iter().map(|&point| moved(motion, point)).collect();
+    let floats = axes.iter().all(|&axis| kind(axis) == DataType::Float32);
+    let enough = floats && stays_single(points, &new).is_ok();
     let kinds = [0, 1, 2].map(|axis| {
-        let single =
-            kind(axes[axis]) == DataType::Float32 && Scalar::F32.for_moved(axis, points, &new) == Scalar::F32;
+        let single = kind(axes[axis]) == DataType::Float32
+            && Scalar::F32.for_moved(axis, points, &new, enough) == Scalar::F32;
         if single { DataType::Float32 } else { DataType::Float64 }
     });
     let mut changes = vec![Change { axes, new, kinds }];

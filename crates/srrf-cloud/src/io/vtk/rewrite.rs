@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 use std::ops::Range;
 
+use super::super::outgoing::stays_single;
 use super::super::scalar::Scalar;
 use super::super::scan::{Splice, moved, put_number, turned, words};
 use super::legacy::Legacy;
@@ -19,10 +20,12 @@ pub(super) fn rewrite(bytes: &[u8], file: &Legacy, motion: &Rigid, out: &mut dyn
     let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
     let kind = file.kind.unwrap_or(Scalar::F64);
     // All three coordinates are of one type.
-    let fits = |axis: usize| kind.for_moved(axis, old, &new) == kind;
-    let wide = if (0..3).all(fits) { kind } else { Scalar::F64 };
+    let single = kind.is_single() && stays_single(old, &new).is_ok();
+    let kinds = [0, 1, 2].map(|axis| kind.for_moved(axis, old, &new, single));
+    let wide = kinds.into_iter().find(|&other| other != kind).unwrap_or(kind);
     if wide != kind {
-        splice.replace(file.kind_place.clone(), b"double")?;
+        splice
+            .replace(file.kind_place.clone(), if wide == Scalar::F32 { &b"float"[..] } else { b"double" })?;
     }
     put(&mut splice, bytes, file, &file.place, wide, old, &new)?;
     let mut normals: Vec<_> = file.data.iter().filter(|data| data.normals).collect();
@@ -55,7 +58,7 @@ fn put(
     for ((at, word), (&old, &new)) in words(text).zip(values) {
         let begin = place.start + at;
         let mut number = Vec::with_capacity(32);
-        put_number(&mut number, new);
+        put_number(&mut number, if kind == Scalar::F32 { f64::from(new as f32) } else { new });
         if old != new && !(old.is_nan() && new.is_nan()) {
             splice.replace(begin..begin + word.len(), &number)?;
         }
@@ -72,9 +75,10 @@ pub(super) fn rewrite_xml(bytes: &[u8], file: &Xml, motion: &Rigid, out: &mut dy
         let old = &array.values;
         let change = if array.normals { turned } else { moved };
         let new: Vec<[f64; 3]> = old.iter().map(|&point| change(motion, point)).collect();
-        let fits =
-            |axis: usize| array.kind == Scalar::F32 && array.kind.for_moved(axis, old, &new) == array.kind;
-        let single = array.kind == Scalar::F32 && (array.normals || (0..3).all(fits));
+        let single = array.kind == Scalar::F32
+            && (array.normals
+                || (0..3).all(|axis| array.kind.for_moved(axis, old, &new, false) == array.kind)
+                || stays_single(old, &new).is_ok());
         let kind = if single { "Float32" } else { "Float64" };
         let name = array.name.replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;");
         let head =
