@@ -60,6 +60,9 @@ pub struct Consensus {
     pub posterior: Vec<f64>,
     /// The loops of edges that hold.
     pub loops: Vec<EdgeLoop>,
+    /// Loops that close with two or more edges which contradict the map: wrong edges do not agree by chance, so that either these are
+    /// right, or places look alike.
+    pub rivals: Vec<EdgeLoop>,
 }
 
 /// Finds it. `prior` is the probability of each edge by its registration; `abstains` says where that is too little.
@@ -92,8 +95,21 @@ pub fn agree(nodes: usize, edges: &[GraphEdge], prior: &[f64], abstains: &[bool]
     }
     let holds: Vec<bool> = verdicts.iter().map(|v| *v == EdgeVerdict::Holds).collect();
     settle(nodes, &mut poses, edges, &holds, &groups);
+    let rivals = rivals(&all, &verdicts, prior);
     let holding = all.into_iter().filter(|l| l.edges.iter().all(|e| holds[*e])).collect();
-    Consensus { poses, components: groups, verdicts, posterior, loops: holding }
+    Consensus { poses, components: groups, verdicts, posterior, loops: holding, rivals }
+}
+
+/// The loops that close with two or more edges that contradict, each likely by its registration; the others hold or contradict too.
+fn rivals(loops: &[EdgeLoop], verdicts: &[EdgeVerdict], prior: &[f64]) -> Vec<EdgeLoop> {
+    let contradicts = |e: &usize| verdicts[*e] == EdgeVerdict::Contradicts && prior[*e] >= HALF;
+    let speaks = |e: &usize| verdicts[*e] == EdgeVerdict::Holds || contradicts(e);
+    loops
+        .iter()
+        .filter(|l| l.closes() == Some(true) && l.edges.iter().all(speaks))
+        .filter(|l| l.edges.iter().filter(|e| contradicts(e)).count() >= 2)
+        .cloned()
+        .collect()
 }
 
 /// For each edge, whether a loop of likely edges closes with it, and whether one does not.
@@ -241,6 +257,28 @@ mod tests {
             assert_eq!(*verdict, expected, "edge {number}");
         }
         assert!(off(&found.poses, &truth) < 1e-6, "{}", off(&found.poses, &truth));
+        assert!(found.rivals.is_empty(), "wrong edges agree with none: {:?}", found.rivals);
+    }
+
+    /// Node 4 is held by two nodes here, and by two others elsewhere.
+    #[test]
+    fn what_contradicts_and_agrees_with_itself_is_never_silent() {
+        let truth = ring(5);
+        let mut edges: Vec<GraphEdge> =
+            [(0, 1), (0, 2), (1, 2), (0, 3), (1, 3), (2, 3), (4, 2), (4, 3), (4, 0), (4, 1)]
+                .map(|(a, b)| exact(&truth, a, b))
+                .to_vec();
+        let mut other = truth.clone();
+        other[4] = exp(&nalgebra::Vector6::new(0.0, 0.0, 0.3, 5.0, 1.0, 0.0)).compose(&other[4]);
+        edges[8] = exact(&other, 4, 0);
+        edges[9] = exact(&other, 4, 1);
+        for sure in [[0.95, 0.95], [0.98, 0.9]] {
+            let mut prior = vec![0.95; 10];
+            prior[6..8].fill(sure[0]);
+            prior[8..].fill(sure[1]);
+            let found = agree(5, &edges, &prior, &[false; 10]);
+            assert!(found.components[0].len() == 4 || !found.rivals.is_empty(), "{found:?}");
+        }
     }
 
     #[test]

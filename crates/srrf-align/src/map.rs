@@ -16,6 +16,9 @@ pub struct Map {
     pub components: Vec<Vec<usize>>,
     /// The pairs that were tried.
     pub edges: Vec<MapEdge>,
+    /// Loops (numbers of their edges) of pairs that contradict the map, and agree with each other: places look alike, and the scans of that
+    /// component abstain.
+    pub rivals: Vec<Vec<usize>>,
     /// The loop of holding edges that closes worst; none without loops.
     pub worst_loop: Option<WorstLoop>,
     /// Root mean square distance of the matched points along the normals, over all scans; unit of the input. None without matches.

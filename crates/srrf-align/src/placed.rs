@@ -19,6 +19,9 @@ use crate::trees::spanning_tree;
 /// A motion with a standard deviation above this share of the radius is left open.
 const OPEN_RADII: f64 = 0.1;
 
+/// Most that a scan has in a component of which parts look alike.
+const ALIKE_PROBABILITY: f64 = 0.4;
+
 /// All that was found.
 pub struct Finished<'a> {
     pub surfaces: &'a [ScanSurface],
@@ -45,7 +48,16 @@ pub fn place(all: &Finished<'_>) -> Map {
             wanted.compose(&input[anchor].inverse())
         })
         .collect();
-    let probability = probabilities(n, pool, consensus);
+    let mut probability = probabilities(n, pool, consensus);
+    // Where places look alike, the map may be the wrong one of two.
+    let mut doubted = vec![false; consensus.components.len()];
+    for edge in consensus.rivals.iter().flat_map(|l| &l.edges) {
+        let TriedPair { source, target, .. } = &pool.tried[*edge];
+        [source, target].into_iter().for_each(|scan| doubted[group[*scan]] = true);
+    }
+    (0..n)
+        .filter(|i| doubted[group[*i]])
+        .for_each(|i| probability[i] = probability[i].min(ALIKE_PROBABILITY));
     let scans = (0..n)
         .map(|i| {
             let to_map = &map_from_component[group[i]];
@@ -80,6 +92,7 @@ pub fn place(all: &Finished<'_>) -> Map {
         scans,
         components: consensus.components.clone(),
         edges,
+        rivals: consensus.rivals.iter().map(|l| l.edges.clone()).collect(),
         worst_loop: worst_loop(surfaces, pool, consensus),
         residual,
         choice: choice.clone(),

@@ -335,6 +335,15 @@ fn summary(map: &Map, scans: &ScanFiles, seconds: f64) -> String {
             format!("{} left out: {}", counted(contradicting.len(), "pair"), shortened(&contradicting)),
         );
     }
+    if !map.rivals.is_empty() {
+        line(
+            "alike",
+            format!(
+                "pairs that contradict the map agree with each other in {}: places look alike, and the scans of that map abstain; give --initial or --sequence",
+                counted(map.rivals.len(), "loop")
+            ),
+        );
+    }
     if let Some(worst) = &map.worst_loop {
         let scale = map.residual.unwrap_or(worst.displacement);
         line(

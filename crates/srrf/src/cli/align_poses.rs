@@ -50,6 +50,7 @@ pub fn to_json(map: &Map, scans: &ScanFiles, options: &str, seconds: f64) -> Val
         "contradictions": map.edges.iter().enumerate()
             .filter(|(_, e)| e.verdict == srrf_align::EdgeVerdict::Contradicts)
             .map(|(i, _)| i).collect::<Vec<_>>(),
+        "rivals": map.rivals,
         "worst_loop": map.worst_loop,
         "residual": map.residual,
         "pairs": {
