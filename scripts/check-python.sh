@@ -68,9 +68,7 @@ site=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("pureli
 "$tools/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))' >"$site/tools.pth"
 
 echo "stubs: mypy --strict"
-ignore=
-"$venv/bin/python" -c 'import torch' 2>/dev/null || ignore="--exclude torch\.py$"
-MYPYPATH=$PWD/python "$venv/bin/python" -m mypy $ignore --cache-dir "$scratch/mypy" python/srrf python/examples
+MYPYPATH=$PWD/python "$venv/bin/python" -m mypy --cache-dir "$scratch/mypy" python/srrf python/examples
 
 export SRRF_PROGRAM=$CARGO_TARGET_DIR/debug/srrf SRRF_EVAL_PROGRAM=$CARGO_TARGET_DIR/debug/srrf-eval
 [ -x "$SRRF_PROGRAM" ] || unset SRRF_PROGRAM

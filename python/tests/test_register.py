@@ -201,3 +201,54 @@ def test_far_from_the_origin_nothing_is_lost(cloud, target, truth):
     centre = (cloud + far).mean(axis=0)
     there = found.rotation @ centre + found.translation
     assert np.allclose(there, moved(cloud, truth).mean(axis=0) + far, atol=0.01)
+
+
+def test_rows_are_those_of_the_programs_batch(cloud, target, tmp_path):
+    pa = pytest.importorskip("pyarrow")
+    import pyarrow.parquet as parquet
+
+    from srrf._rows import SCHEMA, PairRegistrar
+
+    srrf.write(tmp_path / "a.npy", cloud)
+    srrf.write(tmp_path / "b.npy", target)
+    srrf.write(tmp_path / "line.xyz", np.outer(np.arange(9.0), [1, 2, 3]))
+    rows = [("a.npy", "b.npy", 0.5), ("b.npy", "a.npy", 1.5), ("gone.npy", "a.npy", 2.0), ("line.xyz", "a.npy", 3.0)]
+    pairs = pa.table({"source": [r[0] for r in rows], "target": [r[1] for r in rows], "weight": [r[2] for r in rows]})
+    parquet.write_table(pairs, tmp_path / "pairs.parquet")
+    arguments = ["batch", str(tmp_path / "pairs.parquet"), "-o", "r.parquet", "--method", "fpfh-ransac", "--quiet"]
+    run = subprocess.run([sys.executable, "-m", "srrf", *arguments], cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 1, run
+    of_program = parquet.read_table(tmp_path / "r.parquet")
+    here = PairRegistrar(tmp_path, method="fpfh-ransac").table(pairs)
+    assert here.schema.names == of_program.schema.names
+    for name in SCHEMA.names:
+        if name not in ("seconds", "answer"):
+            assert here[name].to_pylist() == of_program[name].to_pylist(), name
+
+    def untimed(text):
+        answer = json.loads(text)
+        answer.pop("seconds", None)
+        return json.dumps(answer)
+
+    assert [untimed(a) for a in here["answer"].to_pylist()] == [untimed(a) for a in of_program["answer"].to_pylist()]
+    assert here["error"][0].as_py() is None and "gone.npy" in here["error"][2].as_py()
+    with pytest.raises(srrf.InputError, match="seconds"):
+        PairRegistrar(**FAST).table(pairs.rename_columns(["source", "target", "seconds"]))
+
+
+def test_rows_take_clouds_however_they_are_nested(cloud, target, result):
+    pytest.importorskip("pyarrow")
+    from srrf.ray import RegisterPairs
+
+    actor = RegisterPairs()
+    ragged = np.empty(2, object)
+    ragged[:] = [cloud, cloud[:-1]]
+    nested = np.empty(2, object)
+    nested[:] = [np.array(list(cloud) + [None], object)[:-1], list(cloud[:-1])]
+    stacked = np.stack([cloud, cloud])
+    for source in (ragged, nested, stacked):
+        answers = actor({"id": np.array(["x", "y"]), "source": source, "target": np.stack([target, target])})
+        assert answers["id"].to_pylist() == ["x", "y"] and answers["error"].to_pylist() == [None, None]
+        assert answers["target_from_source"][0].as_py() == result.target_from_source.ravel().tolist()
+    no_name = actor({"source": stacked, "target": stacked})
+    assert "`id`" in no_name["error"][0].as_py()

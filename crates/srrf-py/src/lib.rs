@@ -6,6 +6,8 @@
 
 use pyo3::prelude::*;
 
+use refusal::{Fault, Refusal};
+
 mod cloud;
 mod corruption;
 mod files;
@@ -19,6 +21,17 @@ mod registrar;
 mod score;
 mod work;
 
+/// JSON as the program writes it: keys in order, numbers in the fewest digits that give the same bits.
+///
+/// # Errors
+/// `InternalError` for text that is no JSON.
+#[pyfunction]
+fn canonical_json(text: &str) -> Result<String, Refusal> {
+    let value: serde_json::Value =
+        serde_json::from_str(text).map_err(|e| Refusal::new(Fault::Internal, format!("no JSON: {e}")))?;
+    Ok(value.to_string())
+}
+
 /// The compiled part of the Python package `srrf`.
 #[pymodule]
 fn _srrf(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -26,9 +39,10 @@ fn _srrf(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("CORRUPTIONS", corruption::names())?;
     module.add("FORMATS", srrf_cloud::io::format_names())?;
     module.add_class::<cloud::Cloud>()?;
-    module.add_class::<registrar::Registrar>()?;
-    module.add_class::<registrar::Target>()?;
+    module.add_class::<registrar::PyRegistrar>()?;
+    module.add_class::<registrar::PyTarget>()?;
     module.add_class::<pairs::Pairs>()?;
+    module.add_function(wrap_pyfunction!(canonical_json, module)?)?;
     module.add_function(wrap_pyfunction!(corruption::corrupt, module)?)?;
     module.add_function(wrap_pyfunction!(files::read, module)?)?;
     module.add_function(wrap_pyfunction!(files::write, module)?)?;

@@ -5,6 +5,7 @@ use std::fmt;
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use srrf_args::Failure;
 use srrf_cloud::CloudError;
 use srrf_cloud::io::IoError;
 use srrf_corrupt::{CorruptError, PairError};
@@ -55,14 +56,7 @@ impl Refusal {
 
     /// A cloud, by its name, that cannot be used.
     pub fn cloud(name: &str, error: &CloudError) -> Self {
-        let way_out = match error {
-            CloudError::Empty => "pass an array with at least one row",
-            CloudError::NotFinite { .. } => "remove such points first",
-            CloudError::TooFew { .. } | CloudError::Collinear => {
-                "pass three points or more that are not on one line"
-            }
-        };
-        Self::new(Fault::Input, format!("{name}: {error}; {way_out}"))
+        Self::new(Fault::Input, Failure::cloud(name, error).to_string())
     }
 }
 
@@ -107,7 +101,7 @@ impl From<IoError> for Refusal {
     fn from(error: IoError) -> Self {
         let missing =
             matches!(&error, IoError::Read { source, .. } if source.kind() == std::io::ErrorKind::NotFound);
-        Self::new(if missing { Fault::MissingFile } else { Fault::File }, error.to_string())
+        Self::new(if missing { Fault::MissingFile } else { Fault::File }, Failure::from(error).to_string())
     }
 }
 

@@ -15,16 +15,16 @@ use crate::refusal::Refusal;
 use crate::work;
 
 /// Options and a loaded network.
-#[pyclass(frozen, module = "srrf._srrf")]
-pub struct Registrar {
+#[pyclass(frozen, module = "srrf._srrf", name = "Registrar")]
+pub struct PyRegistrar {
     inner: Arc<srrf::Registrar>,
     threads: usize,
 }
 
 /// A target made ready for many sources.
-#[pyclass(frozen, module = "srrf._srrf")]
+#[pyclass(frozen, module = "srrf._srrf", name = "Target")]
 #[derive(Clone)]
-pub struct Target {
+pub struct PyTarget {
     inner: srrf::Target,
     #[pyo3(get)]
     cloud: Cloud,
@@ -33,7 +33,7 @@ pub struct Target {
 /// What a source is laid on.
 #[derive(FromPyObject)]
 enum OnTo<'py> {
-    Prepared(PyRef<'py, Target>),
+    Prepared(PyRef<'py, PyTarget>),
     Cloud(PyRef<'py, Cloud>),
 }
 
@@ -44,7 +44,7 @@ enum Ready {
 }
 
 #[pymethods]
-impl Registrar {
+impl PyRegistrar {
     #[new]
     #[pyo3(signature = (*, method, rotation, refine, weights, device, seed, abstain_below, num_threads))]
     #[allow(clippy::too_many_arguments, reason = "one for each option")]
@@ -67,11 +67,11 @@ impl Registrar {
     }
 
     /// Makes a target ready.
-    fn prepare(&self, py: Python<'_>, target: &Cloud) -> PyResult<Target> {
+    fn prepare(&self, py: Python<'_>, target: &Cloud) -> PyResult<PyTarget> {
         let (registrar, cloud) = (Arc::clone(&self.inner), target.clone());
         let points = Arc::clone(&cloud.points);
         let inner = work::run(py, self.threads, move |_| Ok(registrar.prepare(&points)?))?;
-        Ok(Target { inner, cloud })
+        Ok(PyTarget { inner, cloud })
     }
 
     /// The answer as one line of JSON: what the program writes by `--json`, without the time of reading.
@@ -116,7 +116,7 @@ impl Registrar {
 }
 
 #[pymethods]
-impl Target {
+impl PyTarget {
     fn __repr__(&self) -> String {
         format!("<Target {}: {} points>", self.cloud.name, self.cloud.points.len())
     }
