@@ -1,4 +1,4 @@
-//! [`Identity`]: which file a path names.
+//! [`FileIdentity`]: which file a path names.
 
 use std::ffi::OsString;
 use std::fs;
@@ -17,7 +17,7 @@ pub(super) fn existing(path: &Path) -> PathBuf {
 
 /// What tells one file from another, whatever it is called.
 #[derive(Debug)]
-pub(super) enum Identity {
+pub(super) enum FileIdentity {
     /// A file that is there.
     #[cfg(unix)]
     There { device: u64, inode: u64 },
@@ -28,7 +28,7 @@ pub(super) enum Identity {
     New { folder: PathBuf, name: OsString },
 }
 
-impl Identity {
+impl FileIdentity {
     pub fn of(path: &Path) -> Self {
         let path = place_of(path);
         if let Some(there) = Self::there(&path) {

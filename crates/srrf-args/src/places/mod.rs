@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use srrf_cloud::io::{format_names, is_cloud_file, place_of, remove_left_overs};
 
-use self::identity::{Identity, existing};
+use self::identity::{FileIdentity, existing};
 use crate::failure::Failure;
 use crate::files::{check_output, is_special, is_stream};
 
@@ -182,14 +182,14 @@ impl Places {
                 streams(&self.outputs)
             )));
         }
-        let files: Vec<(&NamedPlace, Identity)> = self
+        let files: Vec<(&NamedPlace, FileIdentity)> = self
             .outputs
             .iter()
             .filter(|output| !is_stream(&output.path) && !is_special(&output.path))
-            .map(|output| (output, Identity::of(&output.path)))
+            .map(|output| (output, FileIdentity::of(&output.path)))
             .collect();
         for input in self.inputs.iter().filter(|input| !is_stream(&input.path)) {
-            let identity = Identity::of(&existing(&input.path));
+            let identity = FileIdentity::of(&existing(&input.path));
             if let Some((output, _)) = files.iter().find(|(_, of_output)| of_output.is(&identity)) {
                 return Err(Failure::usage(format!(
                     "cannot write {:?} ({}): it is the same file as {:?} ({}), which would be lost; choose another place \

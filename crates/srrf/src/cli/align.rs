@@ -15,7 +15,7 @@ use srrf_cloud::io::{ReadOptions, is_cloud_file};
 
 use super::align_edges::EdgeFile;
 use super::align_initial::{self, EarlierMap};
-use super::align_merge::{MergeArgs, merge};
+use super::align_merge::{MergedCloudArgs, merge};
 use super::align_page;
 use super::align_poses;
 use super::align_scans::ScanFiles;
@@ -57,7 +57,7 @@ pub struct AlignArgs {
     kitti: Option<PathBuf>,
 
     #[command(flatten)]
-    merge: MergeArgs,
+    merge: MergedCloudArgs,
 
     /// Write a page that shows the map, for any browser
     #[arg(long, value_name = value::FILE)]

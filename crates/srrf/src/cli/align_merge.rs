@@ -17,7 +17,7 @@ const LARGEST_INDEX: f64 = 9.0e15;
 
 /// What to write of the merged cloud.
 #[derive(Debug, Clone, Args)]
-pub struct MergeArgs {
+pub struct MergedCloudArgs {
     /// Write the largest map as one cloud, PLY, with the number of the scan as the field `scan`
     #[arg(long, value_name = "FILE")]
     pub save: Option<PathBuf>,
@@ -34,7 +34,7 @@ fn length(text: &str) -> Result<f64, String> {
     }
 }
 
-impl MergeArgs {
+impl MergedCloudArgs {
     /// Checks what can be checked before any work.
     ///
     /// # Errors
@@ -65,7 +65,12 @@ struct VoxelPoint {
 ///
 /// # Errors
 /// [`Failure`] for scans that cannot be read again, voxels far too small, and where it cannot be written.
-pub fn merge(map: &Map, scans: &ScanFiles, args: &MergeArgs, path: &Path) -> Result<(usize, usize), Failure> {
+pub fn merge(
+    map: &Map,
+    scans: &ScanFiles,
+    args: &MergedCloudArgs,
+    path: &Path,
+) -> Result<(usize, usize), Failure> {
     let members = &map.components[0];
     let size = match args.voxel {
         Some(size) => size,
@@ -160,7 +165,7 @@ mod tests {
 
     #[test]
     fn nothing_but_ply() {
-        let args = |name: &str| MergeArgs { save: Some(name.into()), voxel: None };
+        let args = |name: &str| MergedCloudArgs { save: Some(name.into()), voxel: None };
         assert!(args("m.PLY").check().is_ok() && args("-").check().is_ok());
         assert!(args("m.pcd").check().unwrap_err().to_string().contains("name it `.ply`"));
         assert!(

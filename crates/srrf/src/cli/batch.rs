@@ -257,7 +257,7 @@ struct Batch<'a> {
 }
 
 /// What the workers share.
-struct State {
+struct BatchState {
     results: Results,
     digest: Digest,
     outcome: Result<(), Failure>,
@@ -275,7 +275,7 @@ impl Batch<'_> {
     ) -> Result<(Results, Digest), Failure> {
         let workers = threads.min(todo.len()).max(1);
         let next = AtomicUsize::new(0);
-        let state = Mutex::new(State { results, digest: Digest::default(), outcome: Ok(()) });
+        let state = Mutex::new(BatchState { results, digest: Digest::default(), outcome: Ok(()) });
         let work = || {
             let pool = ThreadPoolBuilder::new().num_threads((threads / workers).max(1)).build();
             let pool = match pool {
@@ -292,7 +292,7 @@ impl Batch<'_> {
                 let Some(row) = todo.get(place) else { return };
                 let line = pool.install(|| self.line(row));
                 let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
-                let State { results, digest, outcome } = &mut *state;
+                let BatchState { results, digest, outcome } = &mut *state;
                 digest.add(&line);
                 if outcome.is_ok() {
                     *outcome = results.put(place, &line);
@@ -308,7 +308,8 @@ impl Batch<'_> {
                 scope.spawn(work);
             }
         });
-        let State { results, digest, outcome } = state.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let BatchState { results, digest, outcome } =
+            state.into_inner().unwrap_or_else(PoisonError::into_inner);
         outcome.map(|()| (results, digest))
     }
 

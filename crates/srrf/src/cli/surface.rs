@@ -71,7 +71,13 @@ impl SurfaceArgs {
         !self.vertices && input.faces.len() + input.lost_faces > 0
     }
 
-    fn plan(self, source: &Input, target: &Input, one_unit: bool, seed: u64) -> Result<[Plan; 2], Failure> {
+    fn plan(
+        self,
+        source: &Input,
+        target: &Input,
+        one_unit: bool,
+        seed: u64,
+    ) -> Result<[SurfacePlan; 2], Failure> {
         let inputs = [source, target];
         let meshes = [mesh(source, self.vertices)?, mesh(target, self.vertices)?];
         let other = |i: usize| match (&meshes[1 - i], one_unit) {
@@ -82,7 +88,7 @@ impl SurfaceArgs {
         Ok([0, 1].map(|i| {
             let faces = inputs[i].faces.len() + inputs[i].lost_faces;
             if faces == 0 {
-                return Plan::default();
+                return SurfacePlan::default();
             }
             let (vertices, mesh) = (inputs[i].cloud.len(), meshes[i].as_ref());
             let draw = mesh.map(|mesh| SurfaceDraw::for_counterpart(mesh, vertices, other(i)));
@@ -94,20 +100,20 @@ impl SurfaceArgs {
                 _ => None,
             };
             let faces_left_out = mesh.map_or(0, TriangleMesh::left_out) + inputs[i].lost_faces;
-            Plan { drawn: Some(DrawnSurface { vertices, faces, faces_left_out, draw }), cloud }
+            SurfacePlan { drawn: Some(DrawnSurface { vertices, faces, faces_left_out, draw }), cloud }
         }))
     }
 }
 
 /// What becomes of an input.
 #[derive(Debug, Default)]
-struct Plan {
+struct SurfacePlan {
     drawn: Option<DrawnSurface>,
     /// Where it is not its vertices.
     cloud: Option<PointCloud>,
 }
 
-impl Plan {
+impl SurfacePlan {
     fn apply(self, input: &mut Input) -> Option<DrawnSurface> {
         if let Some(cloud) = self.cloud {
             input.cloud = cloud;

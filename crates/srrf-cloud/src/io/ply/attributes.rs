@@ -6,7 +6,7 @@ use super::super::Outgoing;
 use super::super::outgoing::COLOURS;
 use super::super::scalar::Scalar;
 use super::super::{Attribute, AttributeValues, FormatError, ReadOptions};
-use super::body::{Cursor, cut_short};
+use super::cursor::{Cursor, cut_short};
 use super::header::{PlyEncoding, PlyHeader, Property};
 
 /// Reads all properties of `vertex` but the place and lists.

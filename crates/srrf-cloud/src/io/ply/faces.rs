@@ -1,7 +1,7 @@
 //! The faces of a PLY file as triangles.
 
 use super::super::{FormatError, ReadOptions};
-use super::body::{Cursor, cut_short};
+use super::cursor::{Cursor, cut_short};
 use super::header::{Element, PlyEncoding, Property};
 
 /// An element whose rows are polygons, or strips of triangles.

@@ -2,6 +2,7 @@
 
 mod attributes;
 mod body;
+mod cursor;
 mod faces;
 mod header;
 mod rewrite;

@@ -7,7 +7,8 @@ use super::super::ReadOptions;
 use super::super::outgoing::stays_single;
 use super::super::scalar::Scalar;
 use super::super::scan::{Splice, moved, put_number, turned};
-use super::body::{Cursor, read};
+use super::body::read;
+use super::cursor::Cursor;
 use super::header::{PlyEncoding, PlyHeader};
 use crate::Rigid;
 
