@@ -1,5 +1,7 @@
 //! Meshes, units and depth cameras, from files to files.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
 #[path = "../examples/cad_clouds.rs"]
 #[allow(dead_code, reason = "its own `main`")]
 mod cad_clouds;
