@@ -2,14 +2,11 @@
 
 use std::path::Path;
 
-use srrf_cloud::{CloudError, PointCloud};
+pub use srrf_calibrate::{VALIDATION_SHAPES, keep};
+
 use srrf_corrupt::{Pair, Severity};
 use srrf_train::TrainConfig;
 use srrf_train::data::{TrainingPairs, training_shapes};
-
-/// Shapes that the network of the program, `srrf`, was validated with ([`srrf_corrupt::datasets::held_out`]):
-/// `data.validation` of its configuration.
-pub const VALIDATION_SHAPES: usize = 192;
 
 /// Any error, across threads.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -34,13 +31,4 @@ pub fn held_out_pairs(
         }
     }
     Ok((description, found))
-}
-
-/// Leaves the points of these numbers.
-///
-/// # Errors
-/// [`CloudError`] when there are none.
-pub fn keep(cloud: &mut PointCloud, kept: &[usize]) -> Result<(), CloudError> {
-    *cloud = PointCloud::new(kept.iter().map(|&i| cloud.points()[i]).collect())?;
-    Ok(())
 }

@@ -99,7 +99,8 @@ impl From<IoError> for Failure {
 fn way_out(error: &CloudError) -> &'static str {
     match error {
         CloudError::Empty => "; is it the right file?",
-        CloudError::NotFinite { .. } => "; remove such points first",
+        CloudError::NotFinite { .. } | CloudError::Stray { .. } => "; remove such points first",
+        CloudError::OutOfRange { .. } => "; scale the cloud first",
         CloudError::TooFew { .. } | CloudError::Collinear => {
             "; take a cloud with three points or more that are not on one line"
         }

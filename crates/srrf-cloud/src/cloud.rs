@@ -29,6 +29,25 @@ pub enum CloudError {
     /// All points lie on one line (or coincide), so that no rotation can be found.
     #[error("the points lie on one line (or coincide): a rotation cannot be determined from them")]
     Collinear,
+    /// The cloud is too large or too small to compute with: squares of its lengths would be lost.
+    #[error("the cloud is {size:e} wide: lengths from 1e-100 to 1e100 can be computed with")]
+    OutOfRange {
+        /// Largest side of its bounding box, unit of the points.
+        size: f64,
+    },
+    /// Some points lie so far out that the others would coincide.
+    #[error(
+        "{count} of the points lie over a billion times farther out than half of the cloud (the first is point {index}, {point:?}): \
+         the others lose their digits"
+    )]
+    Stray {
+        /// How many.
+        count: usize,
+        /// Index of the first.
+        index: usize,
+        /// Its coordinates.
+        point: [f64; 3],
+    },
 }
 
 /// A non-empty cloud of finite points, in the unit of its source.

@@ -8,6 +8,7 @@
 mod centred;
 mod cloud;
 mod euler;
+mod extent;
 mod fps;
 mod frame;
 pub mod io;

@@ -4,7 +4,7 @@ use std::ops::Deref;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::{CloudError, PointCloud};
+use crate::{CloudError, PointCloud, extent};
 
 /// A cloud that was found to determine a rotation: three points or more, not all on one line.
 ///
@@ -17,11 +17,13 @@ impl<'a> Solid<'a> {
     /// the first.
     ///
     /// # Errors
-    /// [`CloudError::TooFew`] or [`CloudError::Collinear`].
+    /// [`CloudError::TooFew`] or [`CloudError::Collinear`]; [`CloudError::OutOfRange`] and [`CloudError::Stray`] for coordinates that
+    /// cannot be computed with.
     pub fn new(cloud: &'a PointCloud) -> Result<Self, CloudError> {
         if cloud.len() < 3 {
             return Err(CloudError::TooFew { have: cloud.len(), need: 3 });
         }
+        extent::check(cloud)?;
         let mean = cloud.centroid();
         let scatter = cloud.points().iter().fold(Matrix3::zeros(), |sum, p| {
             let d = Vector3::from(*p) - mean;

@@ -23,25 +23,40 @@
 //! ```
 
 mod affine;
+mod alternatives;
+mod assess;
+mod chance;
 mod config;
 mod deformation;
 mod evidence;
+mod freedom;
 mod matching;
+mod orientations;
 mod prepared;
+mod probe;
 mod refine;
 mod register;
 mod robust;
+mod scatter;
 mod soft;
 mod solve;
+mod symmetry;
 mod target;
+mod twist;
 mod verdict;
 
 pub use affine::AffineFit;
+pub use alternatives::Alternative;
+pub use assess::Assessment;
+pub use chance::Chance;
 pub use config::{Deformed, Metric, Ranking, RefineConfig, RefineError};
 pub use deformation::ResidualStructure;
 pub use evidence::Evidence;
+pub use freedom::{FreeMotion, Freedom};
 pub use refine::{Refinement, StartSupport};
 pub use register::Refined;
+pub use scatter::Scatter;
 pub use solve::{Match, NormalEquations};
 pub use target::{RefineSource, RefineTarget, refine};
+pub use twist::{MotionKind, Twist};
 pub use verdict::Verdict;

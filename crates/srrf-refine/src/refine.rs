@@ -80,12 +80,7 @@ impl RefineRun<'_> {
             let local = self.local(given);
             let pose = if short { self.short_run(&local) } else { local };
             let target_from_source = if short { self.global(&pose) } else { *given };
-            let (matches, spacing) = self.coarse_matches(&pose);
-            let support = support(&matches, spacing);
-            let rank = match self.config.ranking {
-                Ranking::Points => support,
-                Ranking::Planes => plane_support(&matches, spacing),
-            };
+            let (support, rank) = self.support_and_rank(&pose);
             StartSupport { given: *given, support, rank, target_from_source }
         };
         match starts {
@@ -107,6 +102,30 @@ impl RefineRun<'_> {
             points.iter().step_by(stride).map(near).sum::<f64>() / points.len().div_ceil(stride) as f64
         };
         0.5 * (mean(s.points(), t, &pose) + mean(t.points(), s, &inverse))
+    }
+
+    /// Support of a pose between the centred clouds, and what it is compared by.
+    fn support_and_rank(&self, pose: &Rigid) -> (f64, f64) {
+        let (matches, spacing) = self.coarse_matches(pose);
+        let support = support(&matches, spacing);
+        let rank = match self.config.ranking {
+            Ranking::Points => support,
+            Ranking::Planes => plane_support(&matches, spacing),
+        };
+        (support, rank)
+    }
+
+    /// What a pose between the centred clouds is compared by.
+    pub(crate) fn rank(&self, pose: &Rigid) -> f64 {
+        self.support_and_rank(pose).1
+    }
+
+    /// More iterations on the coarse level, from near the end.
+    pub(crate) fn medium_run(&self, start: &Rigid, iterations: usize) -> Rigid {
+        let (s, t) = (self.source.coarse(), self.target.coarse());
+        let schedule = ScaleSchedule::new(s, t, start, self.target.radius, self.config);
+        let schedule = ScaleSchedule { start: 2.0 * schedule.end, iterations, ..schedule };
+        self.descend_on(false, start, &schedule, self.config.metric).pose
     }
 
     /// The full run of the best of `starts`, and what to make of it.
@@ -194,17 +213,17 @@ impl RefineRun<'_> {
     }
 
     /// A pose between the inputs as one between the centred clouds.
-    fn local(&self, pose: &Rigid) -> Rigid {
+    pub(crate) fn local(&self, pose: &Rigid) -> Rigid {
         self.source.frame_to(self.target).pose(pose)
     }
 
     /// The way back from [`RefineRun::local`].
-    fn global(&self, pose: &Rigid) -> Rigid {
+    pub(crate) fn global(&self, pose: &Rigid) -> Rigid {
         self.source.frame_to(self.target).undo_pose(pose)
     }
 
     /// A few iterations on the coarse level.
-    fn short_run(&self, start: &Rigid) -> Rigid {
+    pub(crate) fn short_run(&self, start: &Rigid) -> Rigid {
         let (s, t) = (self.source.coarse(), self.target.coarse());
         let schedule = ScaleSchedule {
             iterations: self.config.start_iterations,

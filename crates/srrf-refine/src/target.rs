@@ -1,18 +1,29 @@
 //! [`RefineTarget`] and [`RefineSource`]: clouds made ready, and [`refine`] for one pair.
 
+use std::sync::OnceLock;
+
+use nalgebra::Matrix3;
 use rayon::prelude::*;
 use srrf_cloud::{PointCloud, Rigid, Solid};
 
+use crate::alternatives::{Alternative, alternatives};
+use crate::assess::{Assessment, assess};
 use crate::evidence::{Evidence, evidence};
 use crate::prepared::RefineCloud;
 use crate::refine::{RefineRun, Refinement, StartSupport};
+use crate::symmetry::symmetries;
 use crate::{RefineConfig, RefineError};
+
+/// A source of less than this share of the target's radius is a body in a scene.
+const SMALLER: f64 = 0.8;
 
 /// A target made ready, to refine the poses of many sources.
 #[derive(Debug)]
 pub struct RefineTarget {
     config: RefineConfig,
     prepared: RefineCloud,
+    /// Rotations about the mean that may map it onto itself, once they were asked for.
+    symmetries: OnceLock<Vec<Matrix3<f64>>>,
 }
 
 /// A source made ready by [`RefineTarget::source`], to refine many of its poses.
@@ -29,7 +40,7 @@ impl RefineTarget {
     pub fn new(target: Solid<'_>, config: &RefineConfig) -> Result<Self, RefineError> {
         config.validate()?;
         let prepared = RefineCloud::new(target, config).map_err(RefineError::Target)?;
-        Ok(Self { config: *config, prepared })
+        Ok(Self { config: *config, prepared, symmetries: OnceLock::new() })
     }
 
     /// The settings.
@@ -49,6 +60,37 @@ impl RefineTarget {
     /// What speaks for a pose as it is, without refinement.
     pub fn evidence(&self, source: &RefineSource, pose: &Rigid) -> Evidence {
         evidence(&source.prepared, &self.prepared, pose)
+    }
+
+    /// Whether a pose agrees by more than chance, and what it leaves open.
+    pub fn assess(&self, source: &RefineSource, pose: &Rigid) -> Assessment {
+        assess(&source.prepared, &self.prepared, pose, &self.config)
+    }
+
+    /// Other poses that may fit as well: by symmetries of the smaller cloud, by shifts of lattices, and among `rivals`. Those that only
+    /// move along what `assessed` leaves open are left out. Best first.
+    pub fn alternatives(
+        &self,
+        source: &RefineSource,
+        pose: &Rigid,
+        assessed: &Assessment,
+        rivals: &[Rigid],
+    ) -> Vec<Alternative> {
+        let run = self.run(source);
+        // The smaller cloud is the body; both have their mean at the origin.
+        let moved = run.local(pose);
+        let turn = |rotation: &Matrix3<f64>| Rigid { rotation: *rotation, ..Rigid::identity() };
+        let turned: Vec<Rigid> = if source.prepared.radius < SMALLER * self.prepared.radius {
+            symmetries(source.prepared.coarse(), source.prepared.radius)
+                .iter()
+                .map(|r| moved.compose(&turn(r)))
+                .collect()
+        } else {
+            let known =
+                self.symmetries.get_or_init(|| symmetries(self.prepared.coarse(), self.prepared.radius));
+            known.iter().map(|r| turn(r).compose(&moved)).collect()
+        };
+        alternatives(&run, &moved, turned, &assessed.freedom, rivals)
     }
 
     /// Refines the best of `starts`: poses that map the source near the target.

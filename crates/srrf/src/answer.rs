@@ -7,15 +7,17 @@ use schemars::{JsonSchema, Schema, schema_for};
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 use srrf_cloud::{EulerXyz, Rigid};
-use srrf_refine::{Evidence, Refinement, Verdict};
+use srrf_refine::{Evidence, Refinement, Scatter, Verdict};
 
 use crate::coarse::CoarsePose;
 use crate::features::Features;
 use crate::network::WeightsId;
 use crate::outcome::{Outcome, PointCounts, TriedStart};
+use crate::poses::CandidatePose;
 use crate::probability::Probability;
 use crate::scale::AppliedScale;
 use crate::surface::DrawnSurface;
+use crate::undetermined::Undetermined;
 use crate::warning::Warning;
 
 /// A pose as 4 rows of 4.
@@ -64,6 +66,12 @@ pub struct Answer {
     pub evidence: EvidenceAnswer,
     /// The numbers that the probability was computed from.
     pub features: Features,
+    /// All poses that fit as well, the answer first.
+    pub poses: Vec<PoseAnswer>,
+    /// The motions that the fit leaves open; none where it determines the pose.
+    pub undetermined: Vec<Undetermined>,
+    /// How far the pose would scatter with other noise on the same clouds; null where too few points fit.
+    pub spread: Option<SpreadAnswer>,
     /// Points of both clouds, without those left out.
     pub points: PointCounts,
     /// Wall time of each stage by its name.
@@ -118,6 +126,29 @@ pub struct RunKeys {
     /// In a batch: what the answer depends on besides the clouds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub options: Option<Value>,
+}
+
+/// A pose that fits as well as any other.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct PoseAnswer {
+    /// The pose, as that of the answer.
+    pub target_from_source: Matrix4,
+    /// The probability that it is the right one.
+    #[schemars(with = "f64", range(min = 0.0, max = 1.0))]
+    pub probability: Probability,
+}
+
+/// Standard deviations of the pose by noise.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[schemars(deny_unknown_fields)]
+pub struct SpreadAnswer {
+    /// Of the rotation about x, y and z, in degrees.
+    pub rotation_deg: [f64; 3],
+    /// Of the place of `centre` along x, y and z.
+    pub translation: [f64; 3],
+    /// The mean of the target.
+    pub centre: [f64; 3],
 }
 
 /// What the network found, before any refinement.
@@ -251,6 +282,9 @@ impl Answer {
             refinement: outcome.refinement.as_ref().map(|r| RefinementAnswer::new(r, &outcome.tried)),
             evidence: EvidenceAnswer::new(&outcome.evidence),
             features: outcome.features,
+            poses: outcome.poses.iter().map(PoseAnswer::new).collect(),
+            undetermined: outcome.undetermined.clone(),
+            spread: SpreadAnswer::new(&outcome.spread),
             points: outcome.points,
             seconds,
             seed: outcome.seed,
@@ -280,6 +314,20 @@ impl NoAnswer {
     /// A pair without a pose, and why.
     pub fn new(error: String) -> Self {
         Self { schema: AnswerVersion::V1, error, run: RunKeys::default() }
+    }
+}
+
+impl PoseAnswer {
+    fn new(pose: &CandidatePose) -> Self {
+        Self { target_from_source: matrix(&pose.target_from_source), probability: pose.probability }
+    }
+}
+
+impl SpreadAnswer {
+    fn new(spread: &Scatter) -> Option<Self> {
+        let (rotation_deg, translation) = (spread.rotation_deg(), spread.translation());
+        let finite = rotation_deg.iter().chain(&translation).all(|v| v.is_finite());
+        finite.then(|| Self { rotation_deg, translation, centre: spread.centre.into() })
     }
 }
 

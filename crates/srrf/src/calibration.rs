@@ -22,10 +22,10 @@ pub enum CalibrationError {
     },
 }
 
-/// Logistic regression on the features and their products of pairs.
+/// Logistic regression on the features and their squares.
 ///
-/// Fitted by `cargo run --release -p srrf-lab --bin calibrate` on pairs made from training shapes and
-/// built-in shapes, none of which any test uses; the file holds what it was fitted on.
+/// Fitted by `cargo run -p srrf-calibrate --bin calibrate` on pairs made from training shapes and
+/// built-in shapes, and public scans, none of which any test uses; the file holds what it was fitted on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Logistic {
@@ -127,6 +127,7 @@ mod tests {
             agreeing_starts: 0.3,
             deformed: 0.3,
             rank: 0.3,
+            ..Features::default()
         }
     }
 
@@ -162,6 +163,13 @@ mod tests {
             agreeing_starts: 1.0,
             deformed: 0.0,
             rank: 0.95,
+            log_false_alarms: -100.0,
+            least_margin: 100.0,
+            certain_share: 1.0,
+            share_of_poses: 1.0,
+            challenger: 0.3,
+            chance_share: 0.05,
+            ..Features::default()
         };
         let bad = Features {
             fitness: 0.3,
@@ -174,6 +182,12 @@ mod tests {
             agreeing_starts: 0.1,
             deformed: 0.0,
             rank: 0.4,
+            log_false_alarms: -30.0,
+            least_margin: 0.1,
+            certain_share: 0.02,
+            share_of_poses: 1.0,
+            chance_share: 0.05,
+            ..Features::default()
         };
         // What `srrf register --seed 1` finds of bun315 and bun090, two scans that share a tenth, 4 degrees off.
         let doubtful = Features {
@@ -187,8 +201,14 @@ mod tests {
             agreeing_starts: 0.5,
             deformed: 0.0,
             rank: 0.2537,
+            log_false_alarms: -20.0,
+            least_margin: 0.1,
+            certain_share: 0.02,
+            share_of_poses: 1.0,
+            chance_share: 0.03,
+            ..Features::default()
         };
-        assert_eq!(model.probability(&Features { rank: f64::NAN, ..good }), Probability::ZERO);
+        assert_eq!(model.probability(&Features { fitness: f64::NAN, ..good }), Probability::ZERO);
         let [good, bad, doubtful] = [good, bad, doubtful].map(|features| model.probability(&features).get());
         assert!(good > 0.9 && bad < 0.5 && doubtful < 0.3, "{good} {bad} {doubtful}");
     }

@@ -3,12 +3,16 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use srrf_cloud::Rigid;
-use srrf_refine::{Evidence, Refinement, Verdict};
+use srrf_refine::{Alternative, Assessment, Evidence, Refinement, Verdict};
 
 /// Starts with so much of the best one's rank have a say in whether others agree. However many poor starts are tried, they have none.
 const WELL_SUPPORTED: f64 = 0.95;
 /// A start counts as another pose when it is turned by more than this.
 const APART_DEG: f64 = 5.0;
+/// Logarithms beyond this are as good as certain.
+const LIMIT: f64 = 100.0;
+/// Shares below this are as good as none.
+const LEAST_SHARE: f64 = 1e-6;
 
 /// What the probability is computed from: numbers without a unit, of the pose and of its rivals. The truth plays no part.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -34,20 +38,51 @@ pub struct Features {
     pub deformed: f64,
     /// Rank of the start that the pose comes from ([`srrf_refine::StartSupport::rank`]).
     pub rank: f64,
+    /// Logarithm of the number of false alarms ([`srrf_refine::Chance`]), kept within 100 of 0: below 0 the clouds agree by more than
+    /// chance gives.
+    pub log_false_alarms: f64,
+    /// How much worse the pose fits when moved as far as matters, at most 100 ([`srrf_refine::Freedom::least_margin`]).
+    pub least_margin: f64,
+    /// Share of what the fit leaves open that lies near the pose: 1 where it determines all six motions.
+    pub certain_share: f64,
+    /// Weight of the pose among all that fit as well: 1 where it is the only one.
+    pub share_of_poses: f64,
+    /// Rank of the best pose that a symmetry of the clouds, a shift or another start leads to, over that of this one; at most 2.
+    pub challenger: f64,
+    /// Share that lies within a point spacing by chance, the mean of both clouds.
+    pub chance_share: f64,
+    /// Support that an affine map has beyond the pose ([`srrf_refine::AffineFit`]); 0 where none was looked for.
+    pub affine_gain: f64,
+    /// How far it moves the points away from any rigid motion, in point spacings, at most 5.
+    pub affine_bend: f64,
+}
+
+/// What a pose is compared with.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rivals<'a> {
+    /// The poses of all starts after their short run, with their ranks.
+    pub starts: &'a [(Rigid, f64)],
+    /// The start that the pose comes from.
+    pub own: usize,
+    /// Other poses that may fit as well.
+    pub alternatives: &'a [Alternative],
 }
 
 impl Features {
     /// The features of a pose. `rank` is that of the start it comes from, `rivals` are the poses of all starts after their short run,
-    /// with their ranks; one counts as another pose when it is turned by more than 5 degrees.
-    pub fn new(
+    /// with their ranks; one counts as another pose when it is turned by more than 5 degrees, and is not the start `own` that the pose comes from.
+    pub(crate) fn new(
         evidence: &Evidence,
         refinement: Option<&Refinement>,
+        assessment: &Assessment,
         pose: &Rigid,
         rank: f64,
-        rivals: &[(Rigid, f64)],
+        rivals: &Rivals<'_>,
     ) -> Self {
+        let Rivals { starts: rivals, own, alternatives } = *rivals;
         let apart = |other: &Rigid| pose.angle_to_deg(other) > APART_DEG;
-        let rival = rivals.iter().filter(|(p, _)| apart(p)).map(|(_, rank)| *rank).fold(0.0, f64::max);
+        let others = rivals.iter().enumerate().filter(|(number, (p, _))| *number != own && apart(p));
+        let rival = others.map(|(_, (_, rank))| *rank).fold(0.0, f64::max);
         let best = rivals.iter().map(|(_, rank)| *rank).fold(0.0, f64::max);
         let with_a_say: Vec<_> = rivals.iter().filter(|(_, rank)| *rank >= WELL_SUPPORTED * best).collect();
         let agreeing = with_a_say.iter().filter(|(p, _)| !apart(p)).count();
@@ -63,11 +98,20 @@ impl Features {
             agreeing_starts: agreeing as f64 / with_a_say.len().max(1) as f64,
             deformed: f64::from(u8::from(deformed)),
             rank,
+            log_false_alarms: assessment.chance.log_false_alarms.clamp(-LIMIT, LIMIT),
+            least_margin: assessment.freedom.least_margin.min(LIMIT),
+            certain_share: assessment.freedom.open.iter().map(|motion| motion.certain_share).product(),
+            challenger: alternatives.iter().map(|a| a.rank).fold(0.0, f64::max).min(2.0),
+            chance_share: 0.5 * (assessment.chance.share_source + assessment.chance.share_target),
+            affine_gain: assessment.affine.map_or(0.0, |fit| fit.gain),
+            affine_bend: assessment.affine.map_or(0.0, |fit| fit.bend.min(5.0)),
+            share_of_poses: 1.0 / (1.0 + alternatives.iter().map(|a| a.log_weight.exp()).sum::<f64>()),
         }
     }
 
-    /// The numbers, in the order in which the calibration weighs them.
-    fn values(&self) -> [f64; 10] {
+    /// The numbers, in the order in which the calibration weighs them. Whether other starts agree and how its own start ranked are none
+    /// of them, since an answer from a good first guess has one start, which is not moved.
+    fn values(&self) -> [f64; 15] {
         [
             self.fitness,
             self.overlap_target,
@@ -75,28 +119,35 @@ impl Features {
             self.support,
             self.residual_correlation,
             self.residual_median_over_spacing,
-            self.rival_support,
-            self.agreeing_starts,
             self.deformed,
-            self.rank,
+            self.chance_share,
+            self.log_false_alarms / LIMIT,
+            (self.least_margin.max(0.0) / LIMIT).sqrt(),
+            self.affine_gain,
+            self.affine_bend,
+            self.rival_support.max(self.challenger).min(2.0),
+            self.share_of_poses.max(LEAST_SHARE).ln(),
+            self.certain_share.max(LEAST_SHARE).ln(),
         ]
     }
 
-    /// The features with their products of pairs.
+    /// The features with their squares.
     pub(crate) fn expanded(&self) -> Vec<f64> {
         let x = self.values();
-        let mut out = x.to_vec();
-        for i in 0..x.len() {
-            for j in i..x.len() {
-                out.push(x[i] * x[j]);
-            }
+        // NaN must not hide behind a largest or least value.
+        let all =
+            [self.rival_support, self.challenger, self.least_margin, self.share_of_poses, self.certain_share];
+        if all.iter().any(|v| v.is_nan()) {
+            return vec![f64::NAN; 2 * x.len()];
         }
-        out
+        x.iter().copied().chain(x.iter().map(|v| v * v)).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use srrf_refine::{Chance, Freedom, Scatter};
+
     use super::*;
 
     #[test]
@@ -113,14 +164,26 @@ mod tests {
             information: nalgebra::Matrix6::identity(),
             information_centre: nalgebra::Vector3::zeros(),
         };
+        let assessment = Assessment {
+            chance: Chance { log_false_alarms: -1e3, share_source: 0.1, share_target: 0.1 },
+            freedom: Freedom { open: Vec::new(), least_margin: 7.0 },
+            affine: None,
+            spread: Scatter { covariance: nalgebra::Matrix6::zeros(), centre: nalgebra::Vector3::zeros() },
+        };
         let turned = |degrees: f64| Rigid {
             rotation: *nalgebra::Rotation3::from_scaled_axis(nalgebra::Vector3::x() * degrees.to_radians())
                 .matrix(),
             ..Rigid::identity()
         };
         let agreeing = |rivals: &[(Rigid, f64)]| {
-            Features::new(&evidence, None, &turned(0.0), 0.5, rivals).agreeing_starts
+            let rivals = Rivals { starts: rivals, own: 0, alternatives: &[] };
+            Features::new(&evidence, None, &assessment, &turned(0.0), 0.5, &rivals).agreeing_starts
         };
+        let all = {
+            let none = Rivals { starts: &[], own: 0, alternatives: &[] };
+            Features::new(&evidence, None, &assessment, &turned(0.0), 0.5, &none)
+        };
+        assert_eq!((all.log_false_alarms, all.least_margin, all.certain_share), (-100.0, 7.0, 1.0));
         let mut rivals =
             vec![(turned(0.0), 0.50), (turned(3.0), 0.49), (turned(90.0), 0.48), (turned(1.0), 0.40)];
         assert!((agreeing(&rivals) - 2.0 / 3.0).abs() < 1e-12);
@@ -142,13 +205,40 @@ mod tests {
             "agreeing_starts",
             "deformed",
             "rank",
+            "log_false_alarms",
+            "least_margin",
+            "certain_share",
+            "share_of_poses",
+            "challenger",
+            "chance_share",
+            "affine_gain",
+            "affine_bend",
         ]
         .iter()
         .enumerate()
         .map(|(i, name)| ((*name).to_owned(), (i as f64).into()))
         .collect();
         let features: Features = serde_json::from_value(numbered.into()).unwrap();
-        assert_eq!(features.values(), std::array::from_fn(|i| i as f64));
-        assert_eq!((features.expanded().len(), features.expanded()[64]), (65, 81.0));
+        let logarithms = [13f64.ln(), 12f64.ln()];
+        let want = [
+            0.0,
+            1.0,
+            2.0,
+            3.0,
+            4.0,
+            5.0,
+            8.0,
+            15.0,
+            0.1,
+            0.11f64.sqrt(),
+            16.0,
+            17.0,
+            2.0,
+            logarithms[0],
+            logarithms[1],
+        ];
+        assert_eq!(features.values(), want);
+        assert_eq!((features.expanded().len(), features.expanded()[15 + 6]), (30, 64.0));
+        assert!(Features { challenger: f64::NAN, ..features }.expanded()[0].is_nan());
     }
 }

@@ -4,15 +4,15 @@ use srrf_refine::Ranking;
 
 use crate::calibration::{CalibrationError, Logistic};
 use crate::features::Features;
-use crate::options::{Method, Options};
+use crate::options::Options;
 use crate::probability::Probability;
 
 /// With this probability after a round of starts, no other one is made.
 const SURE: f64 = 0.9;
 
 /// Says how sure answers are.
-#[derive(Debug)]
-pub(crate) struct Judge {
+#[derive(Debug, Clone)]
+pub struct Judge {
     calibration: Logistic,
     /// Whether the calibration was fitted on answers of such options.
     fitted: bool,
@@ -21,7 +21,7 @@ pub(crate) struct Judge {
 
 /// How sure an answer is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Judgement {
+pub struct Judgement {
     /// That it is right.
     pub probability: Probability,
     /// Whether that is too little.
@@ -30,50 +30,99 @@ pub(crate) struct Judgement {
 
 impl Judgement {
     /// Whether no other starts are needed.
-    pub fn is_sure(self) -> bool {
+    pub(crate) fn is_sure(self) -> bool {
         self.probability.get() >= SURE
     }
 }
 
 impl Judge {
-    pub fn new(options: &Options) -> Result<Self, CalibrationError> {
+    pub(crate) fn new(options: &Options) -> Result<Self, CalibrationError> {
         let ranking = options.refine.map(|config| config.ranking);
-        let fitted = options.method == Method::Auto && ranking == Some(Ranking::Planes);
+        let fitted = ranking == Some(Ranking::Planes);
         Ok(Self { calibration: Logistic::embedded()?, fitted, abstain_below: options.abstain_below })
     }
 
-    /// Judges by the evidence. The calibration was fitted on [`Method::Auto`] with refinement and starts ranked by planes; for other
-    /// methods, whose few starts give no rivals to compare with, other ranks, and poses without refinement, the probability is kept
-    /// below the square of the fitness, which only errs on the side of doubt.
+    /// One with another calibration, for answers of the default options.
+    pub fn with(calibration: Logistic) -> Self {
+        Self { calibration, fitted: true, abstain_below: Probability::HALF }
+    }
+
+    /// Judges by the evidence: the regression, less what chance would give; never more than the share of the pose among all that fit as
+    /// well, nor than what the fit leaves open allows.
+    ///
+    /// The calibration was fitted on refined poses whose starts are ranked by planes; for others the probability is kept below the
+    /// square of the fitness, which only errs on the side of doubt.
     pub fn judge(&self, features: &Features) -> Judgement {
-        let calibrated = self.calibration.probability(features);
-        let cautious = Probability::new(features.fitness.powi(2)).unwrap_or(Probability::ZERO);
-        let probability = if self.fitted || calibrated <= cautious { calibrated } else { cautious };
+        let calibrated = self.calibration.probability(features).get();
+        let cautious = if self.fitted { 1.0 } else { features.fitness.powi(2) };
+        let fits = calibrated.min(cautious) * beyond_chance(features.log_false_alarms);
+        let probability = Probability::new(fits.min(allowed(features))).unwrap_or(Probability::ZERO);
         Judgement { probability, abstain: probability < self.abstain_below }
     }
+}
+
+/// Ends of what is open fit worst, and are seldom where the truth is: the share near the pose counts so many times.
+const ENDS: f64 = 4.0;
+
+/// What open motions and other poses that fit as well allow to be sure of, in [0, 1].
+fn allowed(features: &Features) -> f64 {
+    features.share_of_poses.min(ENDS * features.certain_share).min(1.0)
+}
+
+/// The probability that clouds with so many false alarms, of which this is the logarithm, do not agree by chance.
+fn beyond_chance(log_false_alarms: f64) -> f64 {
+    // NaN, too, is none.
+    if log_false_alarms < 0.0 { 1.0 - log_false_alarms.exp() } else { 0.0 }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Method;
 
     fn good() -> Features {
         Features {
             fitness: 0.8,
             overlap_target: 0.8,
-            support: 0.8,
-            agreeing_starts: 1.0,
-            rank: 0.8,
+            inlier_rmse_over_spacing: 0.4,
+            residual_median_over_spacing: 0.4,
+            support: 0.5,
+            rank: 0.9,
+            rival_support: 0.6,
+            chance_share: 0.05,
+            log_false_alarms: -100.0,
+            least_margin: 100.0,
+            certain_share: 1.0,
+            share_of_poses: 1.0,
             ..Features::default()
         }
     }
 
     #[test]
-    fn other_methods_err_on_the_side_of_doubt() {
-        let judged = |method| Judge::new(&Options { method, ..Options::default() }).unwrap().judge(&good());
-        let (auto, icp) = (judged(Method::Auto), judged(Method::Icp));
-        assert!(auto.is_sure() && !auto.abstain, "{auto:?}");
-        assert!((icp.probability.get() - 0.64).abs() < 1e-12 && !icp.is_sure(), "{icp:?}");
+    fn an_answer_means_the_same_for_every_method_and_less_without_refinement() {
+        let judged = |options: Options| Judge::new(&options).unwrap().judge(&good());
+        let by = |method| judged(Options { method, ..Options::default() });
+        assert!(
+            by(Method::Auto).probability.get() > 0.8 && !by(Method::Auto).abstain,
+            "{:?}",
+            by(Method::Auto)
+        );
+        assert!(Method::ALL.into_iter().all(|method| by(method) == by(Method::Auto)));
+        let coarse = judged(Options { refine: None, ..Options::default() }).probability.get();
+        assert!((coarse - 0.64).abs() < 1e-12, "{coarse}");
+    }
+
+    #[test]
+    fn chance_open_motions_and_other_poses_count() {
+        let judge = Judge::new(&Options::default()).unwrap();
+        let judged = |features: Features| judge.judge(&features).probability.get();
+        let sure = judged(good());
+        assert!(judged(Features { certain_share: 0.05, ..good() }) <= 0.2);
+        assert!(judged(Features { share_of_poses: 0.25, ..good() }) <= 0.25);
+        assert_eq!(judged(Features { log_false_alarms: 0.5, ..good() }), 0.0);
+        let coin = judged(Features { log_false_alarms: 0.5f64.ln(), ..good() });
+        assert!(coin <= 0.5 && sure > coin, "{coin} {sure}");
+        assert_eq!(judged(Features { log_false_alarms: f64::NAN, ..good() }), 0.0);
     }
 
     #[test]

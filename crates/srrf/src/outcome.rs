@@ -4,17 +4,19 @@ use nalgebra::{Rotation3, UnitQuaternion};
 use schemars::JsonSchema;
 use serde::Serialize;
 use srrf_cloud::Rigid;
-use srrf_refine::{Evidence, Refinement};
+use srrf_refine::{Evidence, Refinement, Scatter};
 
 use crate::coarse::CoarsePose;
 use crate::features::Features;
 use crate::network::WeightsId;
 use crate::options::Method;
+use crate::poses::CandidatePose;
 use crate::probability::Probability;
 use crate::scale::AppliedScale;
 use crate::stage::StageTime;
 use crate::start::Start;
 use crate::surface::DrawnSurface;
+use crate::undetermined::Undetermined;
 use crate::warning::Warning;
 
 /// Numbers of points.
@@ -67,6 +69,12 @@ pub struct Outcome {
     pub evidence: Evidence,
     /// The numbers that the probability was computed from.
     pub features: Features,
+    /// All poses that fit as well, the answer first, each with its share of the probability.
+    pub poses: Vec<CandidatePose>,
+    /// The motions that the fit leaves open; empty where it determines the pose.
+    pub undetermined: Vec<Undetermined>,
+    /// How far the pose would scatter with other noise on the same clouds; its centre is in input coordinates.
+    pub spread: Scatter,
     /// Sizes of the inputs.
     pub points: PointCounts,
     /// Times, in the order of the stages.

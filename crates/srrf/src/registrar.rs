@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use srrf_cloud::{PointCloud, Solid};
+use srrf_refine::Scatter;
 
 use crate::clock::StageClock;
 use crate::error::Error;
@@ -11,11 +12,13 @@ use crate::judge::{Judge, Judgement};
 use crate::network::LazyNetwork;
 use crate::options::{Method, Options};
 use crate::outcome::{Outcome, PointCounts};
+use crate::poses::CandidatePose;
 use crate::proposals::{Proposals, Round, rounds};
 use crate::request::{Request, RequestTarget};
 use crate::search::{Best, Search};
 use crate::stage::{Stage, StageTime};
 use crate::target::{PreparedPair, Target};
+use crate::undetermined::Undetermined;
 use crate::warning::Warning;
 
 /// With so much probability, an answer that two estimators agree on is left as it is: of such, wider searches hardly change one.
@@ -159,8 +162,14 @@ impl Registrar {
         let weights = network.and_then(|network| Some(network.get().ok()?.weights.clone()));
         let Judgement { probability, abstain } = judgement;
         learned.warnings.extend(abstain.then_some(Warning::Doubtful { probability }));
+        let target_from_source = pair.frame.undo_pose(&best.pose);
+        let answer = CandidatePose { target_from_source, probability };
+        let poses = CandidatePose::all(answer, &best.alternatives, |pose| pair.frame.undo_pose(pose));
+        let spread = best.assessment.spread;
+        let centre = pair.frame.undo_target(&spread.centre.into()).into();
+        let spread = Scatter { centre, ..spread };
         Outcome {
-            target_from_source: pair.frame.undo_pose(&best.pose),
+            target_from_source,
             scale: None,
             surfaces: [None; 2],
             probability,
@@ -172,6 +181,9 @@ impl Registrar {
             refinement: best.refinement,
             evidence: best.evidence,
             features: best.features,
+            poses,
+            undetermined: Undetermined::of(&best.assessment, pair),
+            spread,
             points: PointCounts { source: pair.source.count, target: pair.target_side().count },
             times: learned.times,
             seed: self.options.seed,

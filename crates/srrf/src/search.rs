@@ -1,12 +1,14 @@
 //! [`Search`]: starts in rounds, the best of them refined.
 
 use srrf_cloud::Rigid;
-use srrf_refine::{Evidence, RefineError, RefineTarget, Refinement, StartSupport, Verdict};
+use srrf_refine::{
+    Alternative, Assessment, Evidence, RefineError, RefineTarget, Refinement, StartSupport, Verdict,
+};
 
 use crate::clock::StageClock;
 use crate::coarse::CoarsePose;
 use crate::error::NoPose;
-use crate::features::Features;
+use crate::features::{Features, Rivals};
 use crate::outcome::TriedStart;
 use crate::proposals::{Proposal, Proposals, Proposed, Round};
 use crate::stage::{Stage, StageTime};
@@ -23,6 +25,8 @@ const ALIKE: f64 = 0.05;
 /// A start that is so near the end of another's full run would end there too.
 const SAME_DEG: f64 = 1.0;
 const SAME: f64 = 0.01;
+/// Starts with so much of the best one's rank may fit as well in the end.
+const RIVAL: f64 = 0.85;
 
 /// What the starts so far came to.
 #[derive(Debug, Clone)]
@@ -32,6 +36,9 @@ pub(crate) struct Best {
     pub start: Start,
     pub refinement: Option<Refinement>,
     pub evidence: Evidence,
+    pub assessment: Assessment,
+    /// Other poses that may fit as well.
+    pub alternatives: Vec<Alternative>,
     pub features: Features,
 }
 
@@ -56,7 +63,7 @@ pub(crate) struct Search<'a> {
     /// Less likely starts, for the wide round.
     spare: Vec<Proposal>,
     /// Full runs so far, each after the number of its start; that of the first round comes first.
-    refined: Vec<(usize, Refinement)>,
+    refined: Vec<(usize, Refinement, Assessment)>,
     network: Option<CoarsePose>,
     warnings: Vec<Warning>,
 }
@@ -136,32 +143,49 @@ impl<'a> Search<'a> {
     fn as_given(&self, best: usize) -> Best {
         let pose = self.supports[best].given;
         let evidence = self.target().evidence(&self.pair.refine, &pose);
-        let features = Features::new(&evidence, None, &pose, self.supports[best].rank, &self.rivals());
-        Best { pose, start: self.starts[best], refinement: None, evidence, features }
+        let assessment = self.target().assess(&self.pair.refine, &pose);
+        let rank = self.supports[best].rank;
+        let alternatives = self.alternatives(&pose, &assessment);
+        let rivals = Rivals { starts: &self.rivals(), own: best, alternatives: &alternatives };
+        let features = Features::new(&evidence, None, &assessment, &pose, rank, &rivals);
+        Best {
+            pose,
+            start: self.starts[best],
+            refinement: None,
+            evidence,
+            assessment,
+            alternatives,
+            features,
+        }
     }
 
     fn refined(&mut self, best: usize) -> Result<Best, RefineError> {
-        let known = self.refined.iter().position(|(start, _)| *start == best).or_else(|| {
+        let known = self.refined.iter().position(|(start, ..)| *start == best).or_else(|| {
             // Of another start on its way to the same pose, the full run would end there too.
             let pose = &self.supports[best].target_from_source;
             let there = |run: &Refinement| self.alike(&run.target_from_source, pose, SAME_DEG, SAME);
-            self.refined.iter().position(|(_, run)| !self.pair.is_small() && there(run))
+            self.refined.iter().position(|(_, run, _)| !self.pair.is_small() && there(run))
         });
         let run = match known {
             Some(run) => run,
             None => {
-                self.refined.push((best, self.target().finish(&self.pair.refine, &self.supports)?));
+                let run = self.target().finish(&self.pair.refine, &self.supports)?;
+                let assessment = self.target().assess(&self.pair.refine, &run.target_from_source);
+                self.refined.push((best, run, assessment));
                 self.refined.len() - 1
             }
         };
         let stands = if self.refined[run].1.verdict == Verdict::Deformed { 0 } else { run };
-        let (from, refined) = &self.refined[stands];
+        let (from, refined, assessment) = &self.refined[stands];
+        let assessment = assessment.clone();
         let refined = Refinement { starts: self.supports.clone(), ..refined.clone() };
         let (pose, start, evidence) =
             (refined.target_from_source, self.starts[refined.start], refined.evidence.clone());
         let rank = self.supports[*from].rank;
-        let features = Features::new(&evidence, Some(&refined), &pose, rank, &self.rivals());
-        Ok(Best { pose, start, refinement: Some(refined), evidence, features })
+        let alternatives = self.alternatives(&pose, &assessment);
+        let rivals = Rivals { starts: &self.rivals(), own: refined.start, alternatives: &alternatives };
+        let features = Features::new(&evidence, Some(&refined), &assessment, &pose, rank, &rivals);
+        Ok(Best { pose, start, refinement: Some(refined), evidence, assessment, alternatives, features })
     }
 
     /// Whether the graph of all matches and another source found this pose, each on its own. Small pairs, where every start is cheap,
@@ -184,6 +208,15 @@ impl<'a> Search<'a> {
 
     fn target(&self) -> &'a RefineTarget {
         &self.pair.target.0.refine
+    }
+
+    /// Other poses that may fit as well as an answer: by its symmetries, and the best of the starts.
+    fn alternatives(&self, pose: &Rigid, assessment: &Assessment) -> Vec<Alternative> {
+        let mut rivals = self.rivals();
+        rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let best = rivals.first().map_or(0.0, |(_, rank)| *rank);
+        let close = rivals.into_iter().take_while(|(_, rank)| *rank >= RIVAL * best).map(|(pose, _)| pose);
+        self.target().alternatives(&self.pair.refine, pose, assessment, &close.collect::<Vec<_>>())
     }
 
     /// The poses of all starts with their ranks.

@@ -38,6 +38,12 @@ pub fn text(outcome: &Outcome, source: &Input, target: &Input, seconds: f64) -> 
         "verdict",
         &format!("{verdict}; {:.0} % that it is right ({RIGHT_IN_WORDS})", 100.0 * outcome.probability.get()),
     );
+    if outcome.poses.len() > 1 {
+        line("poses", &format!("{} fit as well; all are in --json", outcome.poses.len()));
+    }
+    for (number, motion) in outcome.undetermined.iter().enumerate() {
+        line(if number == 0 { "undetermined" } else { "" }, &motion.to_string());
+    }
     evidence(outcome, &mut line);
     line("time", &times(outcome, seconds));
     for warning in &outcome.warnings {
@@ -68,6 +74,17 @@ fn evidence(outcome: &Outcome, line: &mut impl FnMut(&str, &str)) {
             count(e.target_points)
         ),
     );
+    let ([x, y, z], shift) = (outcome.spread.rotation_deg(), outcome.spread.translation());
+    if shift.iter().all(|s| s.is_finite()) {
+        line(
+            "",
+            &format!(
+                "spread by noise: {:.3}° and {} (standard deviation)",
+                x.max(y).max(z),
+                length(shift.iter().copied().fold(0.0, f64::max), 3)
+            ),
+        );
+    }
     line("", &format!("start: {}", outcome.start));
     match &outcome.refinement {
         None => line("", "no refinement: this is the coarse pose"),
