@@ -69,7 +69,7 @@ fn single_precision_is_enough_or_refused() {
         let Ok(cloud) = PointCloud::new(rounded) else { continue };
         let mut bytes = Vec::new();
         write_cloud_to(&mut bytes, "kitti", &cloud).unwrap();
-        assert!(same_bits(&open(&bytes, "bin").points().unwrap(), cloud.points()));
+        assert!(same_bits(&open(&bytes, "kitti").points().unwrap(), cloud.points()));
     }
     let map = PointCloud::new(clouds(7).remove(2)).unwrap();
     let error = write_cloud_to(&mut Vec::new(), "kitti", &map).unwrap_err().to_string();

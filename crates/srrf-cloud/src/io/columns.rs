@@ -33,6 +33,9 @@ impl Scalar {
             Self::U32 => column!(u32, U32),
             Self::I64 => column!(i64, I64),
             Self::U64 => column!(u64, U64),
+            Self::F16 => AttributeValues::F32(
+                places.map(|at| self.get(bytes, at, big_endian).unwrap_or(0.0) as f32).collect(),
+            ),
             Self::F32 => column!(f32, F32),
             Self::F64 => column!(f64, F64),
         }
@@ -54,7 +57,7 @@ impl Scalar {
             Self::U32 => cast!(u32, U32),
             Self::I64 => cast!(i64, I64),
             Self::U64 => cast!(u64, U64),
-            Self::F32 => cast!(f32, F32),
+            Self::F16 | Self::F32 => cast!(f32, F32),
             Self::F64 => cast!(f64, F64),
         }
     }

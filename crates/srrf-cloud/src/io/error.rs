@@ -68,6 +68,10 @@ impl FormatError {
         Self::Truncated { expected: expected.into(), found: found.into() }
     }
 
+    pub(super) fn unclear(problem: impl Into<String>, switch: &'static str) -> Self {
+        Self::Unclear { problem: problem.into(), switch }
+    }
+
     pub(super) fn line(line: usize, problem: impl Into<String>) -> Self {
         Self::Line { line, problem: problem.into() }
     }
@@ -123,6 +127,14 @@ pub enum IoError {
         found: &'static str,
         /// What was wrong when it was read as asked.
         source: FormatError,
+    },
+    /// The content is something else that has a name, and is not read.
+    #[error("{path:?}: this is {what}")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What it is, and what to do about it.
+        what: &'static str,
     },
     /// The content does not follow the format.
     #[error("{path:?}: {source}")]

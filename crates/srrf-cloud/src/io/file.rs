@@ -4,19 +4,14 @@ use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
+use super::choice::{detect, extension_of, format_of, named};
 use super::outgoing::{NORMALS, fitted};
-use super::{Attribute, CloudFormat, Contents, FORMATS, FormatError, IoError, ReadOptions, ScanEntry};
+use super::{
+    Attribute, CloudFormat, Contents, FORMATS, FormatError, IoError, PointLayout, ReadOptions, ScanEntry,
+    foreign,
+};
 use super::{Kept, Outgoing, write_atomically};
 use crate::{CloudError, PointCloud, Rigid};
-
-/// Formats that need a cargo feature of the same name, and the extensions of their files.
-const OPTIONAL: &[(&str, &[&str])] = &[
-    ("las", &["las", "laz"]),
-    ("e57", &["e57"]),
-    ("gltf", &["glb", "gltf"]),
-    ("mcap", &["mcap"]),
-    ("parquet", &["parquet", "pq"]),
-];
 
 /// The names of all formats of this build, for help texts.
 pub fn format_names() -> Vec<&'static str> {
@@ -66,6 +61,11 @@ impl CloudFile {
             Ok(format) => format,
             Err(_) => detect(path, &bytes)?,
         };
+        // nuScenes names its sweeps so, and their points are always five numbers.
+        let sweep = path.to_string_lossy().to_ascii_lowercase().ends_with(".pcd.bin");
+        if sweep && options.layout.is_none() && bytes.len().is_multiple_of(PointLayout::NUSCENES.bytes()) {
+            options.layout = Some(PointLayout::NUSCENES);
+        }
         Ok(Self { path: path.to_owned(), bytes, format, options })
     }
 
@@ -85,8 +85,11 @@ impl CloudFile {
     pub fn from_reader_with(
         reader: &mut dyn Read,
         format: Option<&str>,
-        options: ReadOptions,
+        mut options: ReadOptions,
     ) -> Result<Self, IoError> {
+        if format == Some("kitti") {
+            options.layout = options.layout.or(Some(PointLayout::KITTI));
+        }
         let format = format.map(named).transpose()?;
         let path = PathBuf::from("-");
         let bytes = read_within(reader, 0, &path, &options)?;
@@ -279,6 +282,9 @@ impl CloudFile {
     /// What is wrong with the content, or that it is of another format altogether.
     fn error(&self, source: FormatError) -> IoError {
         let path = self.path.clone();
+        if let Some(what) = foreign::name(&self.bytes).filter(|_| !self.format.recognises(&self.bytes)) {
+            return IoError::Foreign { path, what };
+        }
         let found = FORMATS.iter().find(|format| format.recognises(&self.bytes)).map(|format| format.name());
         match found {
             _ if matches!(source, FormatError::Memory { .. } | FormatError::Unclear { .. }) => {
@@ -358,61 +364,4 @@ fn turn_normals(attributes: &mut [Attribute], motion: &Rigid) {
         let kind = attributes[axis].values.scalar().for_turned();
         attributes[axis].values = kind.of_numbers(&values);
     }
-}
-
-/// The extension of a file, in small letters.
-pub(super) fn extension_of(path: &Path) -> String {
-    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
-}
-
-/// The format that the extension of `path` says.
-pub(super) fn format_of(path: &Path) -> Result<&'static dyn CloudFormat, IoError> {
-    let extension = extension_of(path);
-    let unknown =
-        if extension.is_empty() { "there is no extension" } else { "the extension says no known format" };
-    find(path, &extension, unknown)
-}
-
-/// The format of this name or extension.
-pub(super) fn named(name: &str) -> Result<&'static dyn CloudFormat, IoError> {
-    find(Path::new(name), &name.to_ascii_lowercase(), "this is the name of no known format")
-}
-
-fn find(path: &Path, name: &str, fact: &'static str) -> Result<&'static dyn CloudFormat, IoError> {
-    let is = |format: &&&dyn CloudFormat| format.name() == name || format.extensions().contains(&name);
-    if let Some(format) = FORMATS.iter().find(is) {
-        return Ok(*format);
-    }
-    match OPTIONAL.iter().find(|(_, extensions)| extensions.contains(&name)) {
-        Some((format, _)) => Err(IoError::LeftOut { path: path.to_owned(), format }),
-        None => Err(unknown(path, fact)),
-    }
-}
-
-/// The format that the content says.
-fn detect(path: &Path, bytes: &[u8]) -> Result<&'static dyn CloudFormat, IoError> {
-    if bytes.is_empty() {
-        return Err(IoError::Cloud { path: path.to_owned(), source: CloudError::Empty });
-    }
-    if let Some(format) = FORMATS.iter().find(|format| format.recognises(bytes)) {
-        return Ok(*format);
-    }
-    for (magic, format) in [
-        (&b"LASF"[..], "las"),
-        (b"ASTM-E57", "e57"),
-        (b"glTF", "gltf"),
-        (b"\x89MCAP0", "mcap"),
-        (b"PAR1", "parquet"),
-    ] {
-        if bytes.starts_with(magic) {
-            return Err(IoError::LeftOut { path: path.to_owned(), format });
-        }
-    }
-    Err(unknown(path, "neither the name nor the content says a known format"))
-}
-
-fn unknown(path: &Path, fact: &'static str) -> IoError {
-    let mut known: Vec<&str> = FORMATS.iter().flat_map(|f| f.extensions()).copied().collect();
-    known.extend(FORMATS.iter().map(|f| f.name()).filter(|name| !known.contains(name)).collect::<Vec<_>>());
-    IoError::UnknownFormat { path: path.to_owned(), fact, known: known.join(", ") }
 }

@@ -1,5 +1,5 @@
-//! Clouds in files and streams: PLY, PCD, text (XYZ, TXT, CSV, PTS), NPY, NPZ, OBJ, OFF, STL, KITTI's
-//! `.bin`, and with the cargo features of these names LAS/LAZ (`las`) and E57 (`e57`).
+//! Clouds in files and streams: PLY, PCD, text (XYZ, TXT, CSV, PTS), NPY, NPZ, OBJ, OFF, STL, `.bin`
+//! (KITTI, nuScenes), and with the cargo features of these names LAS/LAZ (`las`) and E57 (`e57`).
 //!
 //! Each format is one module here and one line in [`FORMATS`]. The format of a file is chosen by its
 //! extension, and by its content where that says nothing ([`CloudFile`]). Coordinates are `f64`:
@@ -17,15 +17,18 @@ use crate::{PointCloud, Rigid};
 
 mod arrays;
 mod atomic;
+mod axes;
+mod bin;
+mod choice;
 mod columns;
 mod contents;
 #[cfg(feature = "e57")]
 mod e57;
 mod error;
 mod file;
+mod foreign;
 #[cfg(feature = "gltf")]
 mod gltf;
-mod kitti;
 #[cfg(feature = "las")]
 mod las;
 #[cfg(feature = "mcap")]
@@ -42,6 +45,7 @@ mod outgoing;
 mod parquet;
 mod pcd;
 mod ply;
+mod poses;
 mod pts;
 mod ptx;
 mod scalar;
@@ -183,7 +187,7 @@ pub static FORMATS: &[&dyn CloudFormat] = &[
     &off::Off,
     &obj::Obj,
     &stl::Stl,
-    &kitti::Kitti,
+    &bin::Kitti,
     #[cfg(feature = "las")]
     &las::Las,
     #[cfg(feature = "las")]
@@ -242,8 +246,8 @@ pub fn write_cloud(path: &Path, cloud: &PointCloud) -> Result<(), IoError> {
 /// # Errors
 /// As [`write_cloud`].
 pub fn write_outgoing(path: &Path, cloud: &Outgoing<'_>) -> Result<Kept, IoError> {
-    let format = file::format_of(path)?;
-    let extension = file::extension_of(path);
+    let format = choice::format_of(path)?;
+    let extension = choice::extension_of(path);
     let (cloud, kept) = outgoing::fitted(format, &Outgoing { extension: &extension, ..*cloud });
     write_atomically(path, |out| format.write_cloud(&cloud, out))
         .map_err(|source| IoError::Write { path: path.to_owned(), source })?;
@@ -264,7 +268,7 @@ pub fn write_cloud_to(out: &mut dyn Write, format: &str, cloud: &PointCloud) -> 
 /// As [`write_cloud`]; the stream is called `-`.
 pub fn write_outgoing_to(out: &mut dyn Write, format: &str, cloud: &Outgoing<'_>) -> Result<Kept, IoError> {
     let extension = format.to_ascii_lowercase();
-    let format = file::named(format)?;
+    let format = choice::named(format)?;
     let (cloud, kept) = outgoing::fitted(format, &Outgoing { extension: &extension, ..*cloud });
     let written = format.write_cloud(&cloud, out).and_then(|()| out.flush());
     written.map(|()| kept).map_err(|source| IoError::Write { path: "-".into(), source })
@@ -282,7 +286,7 @@ pub fn write_transformed(input: &Path, output: &Path, motion: &Rigid) -> Result<
 
 /// Whether the extension of `path` is that of a known format.
 pub fn is_cloud_file(path: &Path) -> bool {
-    file::format_of(path).is_ok()
+    choice::format_of(path).is_ok()
 }
 
 #[cfg(test)]

@@ -6,21 +6,43 @@ use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-use super::npy::{Npy, array_of, cloud_bytes, columns, known};
+use super::npy::{Npy, array_of, columns, could_be_cloud, known};
 use super::outgoing::{COLOURS, INTENSITY, NORMALS};
 use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
 use crate::Rigid;
 
-/// Names of the array that is the cloud, the first of them that is there.
-const NAMES: [&str; 8] = ["points", "xyz", "cloud", "pcd", "coords", "pos", "vertices", "arr_0"];
+/// Names of the array that is the cloud.
+const NAMES: [&str; 20] = [
+    "points",
+    "point",
+    "xyz",
+    "positions",
+    "position",
+    "pos",
+    "pts",
+    "coords",
+    "coord",
+    "coordinates",
+    "cloud",
+    "pointcloud",
+    "point_cloud",
+    "pcd",
+    "pc",
+    "pcl",
+    "vertices",
+    "verts",
+    "data",
+    "arr_0",
+];
 /// Arrays may unpack to this many times their size in the archive and `SLACK` more: real clouds do not
 /// come near, and a small file cannot fill the memory.
 const RATIO: u64 = 200;
 const SLACK: u64 = 1 << 20;
 
-/// NPZ archives, compressed or not. The cloud is the array named `points`, `xyz`, `cloud`, `pcd`,
-/// `coords`, `pos`, `vertices` or `arr_0`, or else the only one whose shape is `[n, 3]` or wider.
-/// Written with the array `points`, and `colors`, `normals` and one more for each other attribute. A moved copy keeps all other arrays as they are.
+/// NPZ archives, compressed or not. The cloud is the array that [`ReadOptions::array`] names, or the only one with a
+/// name of [`NAMES`], or the only one whose shape is that of a cloud.
+/// Written with the array `points`, and `colors`, `normals` and one more for each other attribute. A moved copy keeps
+/// all other arrays as they are.
 pub(super) struct Npz;
 
 impl CloudFormat for Npz {
@@ -38,21 +60,22 @@ impl CloudFormat for Npz {
 
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
         let mut archive = open(bytes)?;
-        let cloud = choose(&mut archive)?;
-        Npy.read(&unpack_at(&mut archive, cloud, bytes.len())?, options)
+        let cloud = choose(&mut archive, options)?;
+        Npy.read(&unpack_at(&mut archive, cloud, bytes.len(), options)?, options)
     }
 
     fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
         let points = self.read(bytes, options)?.points.len();
         let mut archive = open(bytes)?;
-        let cloud = choose(&mut archive)?;
-        let mut attributes = Npy.attributes(&unpack_at(&mut archive, cloud, bytes.len())?, options)?;
+        let cloud = choose(&mut archive, options)?;
+        let mut attributes =
+            Npy.attributes(&unpack_at(&mut archive, cloud, bytes.len(), options)?, options)?;
         for index in (0..archive.len()).filter(|&index| index != cloud) {
             let name =
                 archive.by_index(index).ok().and_then(|entry| entry.name().ok().map(|n| n.into_owned()));
             let Some(name) = name.as_deref().and_then(|name| name.strip_suffix(".npy")) else { continue };
             // An array of another kind is none of the points'.
-            let Ok(array) = unpack_at(&mut archive, index, bytes.len()) else { continue };
+            let Ok(array) = unpack_at(&mut archive, index, bytes.len(), options) else { continue };
             options.check_memory("the attributes", bytes.len(), array.len())?;
             let columns = columns(&array, points).unwrap_or_default();
             let names = column_names(name, columns.len());
@@ -105,8 +128,8 @@ impl CloudFormat for Npz {
         out: &mut dyn Write,
     ) -> io::Result<()> {
         let mut archive = open(bytes)?;
-        let cloud = choose(&mut archive)?;
-        let array = unpack_at(&mut archive, cloud, bytes.len())?;
+        let cloud = choose(&mut archive, options)?;
+        let array = unpack_at(&mut archive, cloud, bytes.len(), options)?;
         let mut copy = Vec::new();
         Npy.rewrite(&array, options, motion, &mut copy)?;
         let mut written = ZipWriter::new(Cursor::new(Vec::new()));
@@ -148,7 +171,7 @@ fn open(bytes: &[u8]) -> Result<Archive<'_>, FormatError> {
 }
 
 /// The index of the array that is the cloud.
-fn choose(archive: &mut Archive) -> Result<usize, FormatError> {
+fn choose(archive: &mut Archive, options: &ReadOptions) -> Result<usize, FormatError> {
     let mut arrays = Vec::new();
     for index in 0..archive.len() {
         let Ok(entry) = archive.by_index(index) else { continue };
@@ -158,26 +181,54 @@ fn choose(archive: &mut Archive) -> Result<usize, FormatError> {
         };
         // Enough for the header of any array that could be a cloud.
         let mut begin = Vec::new();
-        let could_be = entry.take(4096).read_to_end(&mut begin).is_ok() && cloud_bytes(&begin).is_some();
+        let could_be = entry.take(16_384).read_to_end(&mut begin).is_ok() && could_be_cloud(&begin);
         arrays.push((index, name, could_be));
     }
-    let named = NAMES.iter().find_map(|name| arrays.iter().find(|(_, array, _)| array == name));
-    let mut fitting = arrays.iter().filter(|(_, _, could_be)| *could_be);
-    match (named, fitting.next(), fitting.next()) {
-        (Some((index, _, _)), _, _) | (None, Some((index, _, _)), None) => Ok(*index),
-        (None, one, _) => {
-            let names: Vec<&str> = arrays.iter().map(|(_, name, _)| name.as_str()).take(20).collect();
-            let count = if one.is_none() { "none" } else { "more than one" };
-            Err(FormatError::Content(format!(
-                "of the arrays {names:?} {count} has a shape [points, 3]; name the cloud `points`"
-            )))
-        }
+    let names: Vec<&str> = arrays.iter().map(|(_, name, _)| name.as_str()).take(20).collect();
+    if let Some(asked) = &options.array {
+        let asked = asked.strip_suffix(".npy").unwrap_or(asked);
+        let found = arrays.iter().find(|(_, name, _)| name == asked);
+        return found.map(|(index, _, _)| *index).ok_or_else(|| {
+            FormatError::unclear(format!("there is no array {asked:?}; the arrays are {names:?}"), "--array")
+        });
     }
+    let usual = |name: &str| NAMES.contains(&name.to_ascii_lowercase().as_str());
+    let named = || arrays.iter().filter(|(_, name, _)| usual(name));
+    let fitting = || arrays.iter().filter(|(_, _, could_be)| *could_be);
+    let both = || fitting().filter(|(_, name, _)| usual(name));
+    let counts = [both().count(), named().count(), fitting().count()];
+    let one = match counts {
+        [1, _, _] => both().next(),
+        // Said by its name, so that its own error tells what is wrong with it.
+        [0, 1, _] => named().next(),
+        [0, 0, 1] => fitting().next(),
+        _ => None,
+    };
+    one.map(|(index, _, _)| *index).ok_or_else(|| {
+        if counts[2] == 0 {
+            let problem =
+                format!("of the arrays {names:?} none has a shape [points, 3]; name the cloud `points`");
+            return FormatError::Content(problem);
+        }
+        let several: Vec<&str> = fitting().map(|(_, name, _)| name.as_str()).take(20).collect();
+        FormatError::unclear(
+            format!("of the arrays {names:?} more than one could be the cloud: {several:?}"),
+            "--array",
+        )
+    })
 }
 
 /// The bytes of the array of this index.
-fn unpack_at(archive: &mut Archive, index: usize, file: usize) -> Result<Vec<u8>, FormatError> {
-    unpack(&mut archive.by_index(index).map_err(|e| cannot_unpack(e.to_string()))?, file as u64)
+fn unpack_at(
+    archive: &mut Archive,
+    index: usize,
+    file: usize,
+    options: &ReadOptions,
+) -> Result<Vec<u8>, FormatError> {
+    let mut entry = archive.by_index(index).map_err(|e| cannot_unpack(e.to_string()))?;
+    let size = usize::try_from(entry.size()).unwrap_or(usize::MAX);
+    options.check_memory("the unpacked array", file, size)?;
+    unpack(&mut entry, file as u64)
 }
 
 fn cannot_unpack(problem: String) -> FormatError {
@@ -256,7 +307,10 @@ mod tests {
         assert_eq!(points_of(&Npz, &copy).unwrap(), [[1.1, 2.0, 3.0]]);
         let mut read = open(&copy).unwrap();
         assert_eq!(read.len(), 3);
-        assert_eq!(points_of(&Npy, &unpack_at(&mut read, 0, copy.len()).unwrap()).unwrap(), B);
+        assert_eq!(
+            points_of(&Npy, &unpack_at(&mut read, 0, copy.len(), &ReadOptions::default()).unwrap()).unwrap(),
+            B
+        );
     }
 
     #[test]

@@ -11,6 +11,7 @@ pub(super) enum Scalar {
     U32,
     I64,
     U64,
+    F16,
     F32,
     F64,
 }
@@ -20,7 +21,7 @@ impl Scalar {
     pub fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
+            Self::I16 | Self::U16 | Self::F16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::I64 | Self::U64 | Self::F64 => 8,
         }
@@ -44,6 +45,10 @@ impl Scalar {
             Self::U32 => number!(u32),
             Self::I64 => number!(i64),
             Self::U64 => number!(u64),
+            Self::F16 => {
+                let raw = *bytes.get(at..)?.first_chunk()?;
+                half(if big_endian { u16::from_be_bytes(raw) } else { u16::from_le_bytes(raw) })
+            }
             Self::F32 => number!(f32),
             Self::F64 => number!(f64),
         })
@@ -66,6 +71,8 @@ impl Scalar {
             Self::U32 => number!(u32),
             Self::I64 => number!(i64),
             Self::U64 => number!(u64),
+            // Nothing is written in half precision: `holds` is false.
+            Self::F16 => out.extend_from_slice(&[0, 0x7e]),
             Self::F32 => number!(f32),
             Self::F64 => number!(f64),
         }
@@ -73,7 +80,7 @@ impl Scalar {
 
     /// Whether single precision holds every number of this type.
     pub fn is_single(self) -> bool {
-        matches!(self, Self::I8 | Self::U8 | Self::I16 | Self::U16 | Self::F32)
+        matches!(self, Self::I8 | Self::U8 | Self::I16 | Self::U16 | Self::F16 | Self::F32)
     }
 
     /// Whether this type holds `value` without rounding.
@@ -102,6 +109,18 @@ impl Scalar {
             _ => Self::F32,
         }
     }
+}
+
+/// A number of half precision.
+fn half(bits: u16) -> f64 {
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 0x3ff));
+    let size = match exponent {
+        0 => fraction * 2f64.powi(-24),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1.0 + fraction / 1024.0) * 2f64.powi(exponent - 15),
+    };
+    if bits >> 15 == 1 { -size } else { size }
 }
 
 #[cfg(test)]
@@ -136,6 +155,21 @@ mod tests {
         let mut bytes = Vec::new();
         Scalar::I16.put(-2.0, true, &mut bytes);
         assert_eq!(bytes, [0xff, 0xfe]);
+    }
+
+    #[test]
+    fn half_precision() {
+        for (bits, value) in [
+            (0x3c00, 1.0),
+            (0xc000, -2.0),
+            (0x3555, 0.333_251_953_125),
+            (1, 2f64.powi(-24)),
+            (0x7bff, 65_504.0),
+        ] {
+            assert_eq!(half(bits), value);
+        }
+        assert!(half(0x7e00).is_nan() && half(0xfc00) == f64::NEG_INFINITY);
+        assert!(!Scalar::F16.holds(1.0), "a moved copy takes another type");
     }
 
     #[test]

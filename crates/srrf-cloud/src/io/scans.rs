@@ -20,7 +20,7 @@ pub(super) fn attribute_values(kind: Scalar, values: impl Iterator<Item = f64>) 
         Scalar::U32 => AttributeValues::U32(values.map(|value| value as u32).collect()),
         Scalar::I64 => AttributeValues::I64(values.map(|value| value as i64).collect()),
         Scalar::U64 => AttributeValues::U64(values.map(|value| value as u64).collect()),
-        Scalar::F32 => AttributeValues::F32(values.map(|value| value as f32).collect()),
+        Scalar::F16 | Scalar::F32 => AttributeValues::F32(values.map(|value| value as f32).collect()),
         Scalar::F64 => AttributeValues::F64(values.collect()),
     }
 }

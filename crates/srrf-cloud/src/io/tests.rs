@@ -56,7 +56,12 @@ fn errors_name_the_file() {
     };
     for (name, content, fact) in [
         ("gone.ply", None, "cannot read"),
-        ("cloud.jpg", Some("x"), "known are ply, pcd"),
+        ("cloud.qqq", Some("x"), "known are ply, pcd"),
+        ("cloud.jpg", Some("x"), "a picture"),
+        ("lfs.ply", Some("version https://git-lfs.github.com/spec/v1\noid sha256:1\n"), "`git lfs pull`"),
+        ("page.csv", Some("<!DOCTYPE html>\n<html>"), "a web page"),
+        ("shapes.h5", Some("\u{1}\u{2}"), "HDF5"),
+        ("scan.fls", Some("\u{1}"), "FARO SCENE"),
         ("no_extension", Some("x"), "neither the name nor the content"),
         ("empty", Some(""), "empty"),
         #[cfg(not(feature = "las"))]

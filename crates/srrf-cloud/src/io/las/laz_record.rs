@@ -22,6 +22,14 @@ pub(super) fn guarded<T>(work: impl FnOnce() -> laz::Result<T>) -> Result<T, For
 
 /// Reads the record that says how points of `length` bytes are compressed.
 pub(super) fn vlr(content: &[u8], length: usize) -> Result<LazVlr, FormatError> {
+    // The first word says the compressor: 1 is that of LASzip 1, point by point without chunks.
+    if content.first_chunk() == Some(&[1, 0]) {
+        return Err(FormatError::Content(
+            "this kind of LAZ (LASzip 1, points without chunks) is not supported; write it anew as .las, with `las2las` or \
+             `pdal translate`"
+                .into(),
+        ));
+    }
     let vlr = guarded(|| LazVlr::from_buffer(content))?;
     let size = vlr.items().iter().map(|item| usize::from(item.size())).sum::<usize>();
     let known = vlr.items().iter().all(|item| match item.item_type() {

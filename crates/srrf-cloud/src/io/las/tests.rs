@@ -124,3 +124,14 @@ fn damage_is_found() {
         assert!(points_of(&Las, &scale).unwrap_err().to_string().contains("scales"));
     }
 }
+
+#[test]
+fn laz_of_the_first_laszip_is_named() {
+    let mut bytes = Vec::new();
+    Laz.write(&POINTS, &mut bytes).unwrap();
+    let record = bytes.windows(14).position(|word| word == b"laszip encoded").unwrap() - 2;
+    assert_eq!(bytes[record + 54..][..2], [2, 0], "point by point, in chunks");
+    bytes[record + 54] = 1;
+    let error = points_of(&Laz, &bytes).unwrap_err().to_string();
+    assert!(error.contains("LASzip 1") && error.contains("`pdal translate`"), "{error}");
+}

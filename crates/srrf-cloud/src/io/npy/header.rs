@@ -14,6 +14,7 @@ pub(super) struct NpyKind {
 impl NpyKind {
     fn parse(name: &[u8]) -> Result<Self, FormatError> {
         let scalar = match name.get(1..).unwrap_or_default() {
+            b"f2" => Scalar::F16,
             b"f4" => Scalar::F32,
             b"f8" => Scalar::F64,
             b"i1" => Scalar::I8,
@@ -38,7 +39,7 @@ impl NpyKind {
     pub fn name(self) -> String {
         let order = if self.big_endian { '>' } else { '<' };
         let kind = match self.scalar {
-            Scalar::F32 | Scalar::F64 => 'f',
+            Scalar::F16 | Scalar::F32 | Scalar::F64 => 'f',
             Scalar::I8 | Scalar::I16 | Scalar::I32 | Scalar::I64 => 'i',
             Scalar::U8 | Scalar::U16 | Scalar::U32 | Scalar::U64 => 'u',
         };
@@ -51,7 +52,46 @@ impl NpyKind {
 pub(super) enum Descr {
     Plain(NpyKind),
     /// Named fields, one after the other.
-    Fields(Vec<(String, NpyKind)>),
+    Fields(Vec<NpyField>),
+}
+
+/// A field of a structured array.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct NpyField {
+    /// Empty for padding.
+    pub name: String,
+    /// NumPy's words for the type, as the file has them.
+    pub descr: String,
+    /// The type, where it is one of single numbers.
+    pub kind: Option<NpyKind>,
+    /// Bytes of the field.
+    pub size: usize,
+}
+
+impl NpyField {
+    fn new(name: String, descr: &[u8]) -> Result<Self, FormatError> {
+        let text = String::from_utf8_lossy(descr);
+        let quoted = format!("'{text}'");
+        if let Ok(kind) = NpyKind::parse(descr) {
+            // The numbers of a field of booleans or half precision stay as they are.
+            return Ok(Self { name, size: kind.scalar.size(), kind: Some(kind), descr: quoted });
+        }
+        // Padding, bytes, text (four bytes a letter), times, complex numbers.
+        let size = text.get(2..).and_then(|digits| digits.split('[').next()?.parse::<usize>().ok());
+        let size = match (text.as_bytes().get(1), size) {
+            (Some(b'V' | b'S' | b'c' | b'f' | b'i' | b'u'), Some(size)) => Some(size),
+            (Some(b'U'), Some(letters)) => letters.checked_mul(4),
+            (Some(b'M' | b'm'), _) => Some(8),
+            _ => None,
+        };
+        match size.filter(|&size| size <= 1 << 20) {
+            Some(size) => Ok(Self { name, descr: quoted, kind: None, size }),
+            None => Err(FormatError::Content(format!(
+                "the field {name:?} is of type {}; save the array without it",
+                quote(descr)
+            ))),
+        }
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -101,9 +141,10 @@ impl NpyHeader {
         let descr = match descr {
             Descr::Plain(kind) => format!("'{}'", kind.name()),
             Descr::Fields(fields) => {
-                let field = |(name, kind): &(String, NpyKind)| {
+                let field = |NpyField { name, descr, kind, .. }: &NpyField| {
                     let quote = if name.contains('\'') { '"' } else { '\'' };
-                    format!("({quote}{name}{quote}, '{}')", kind.name())
+                    let descr = kind.map_or_else(|| descr.clone(), |kind| format!("'{}'", kind.name()));
+                    format!("({quote}{name}{quote}, {descr})")
                 };
                 format!("[{}]", fields.iter().map(field).collect::<Vec<_>>().join(", "))
             }
@@ -221,8 +262,19 @@ impl<'a> Parser<'a> {
             self.expect(b'(')?;
             let name = String::from_utf8_lossy(self.string()?).into_owned();
             self.expect(b',')?;
-            fields.push((name, NpyKind::parse(self.string()?)?));
-            // A third entry would be the shape of an array inside the field.
+            let mut field = NpyField::new(name, self.string()?)?;
+            // A third entry is the shape of an array inside the field.
+            if self.eat(b',') && !self.rest.trim_ascii_start().starts_with(b")") {
+                let shape = self.shape()?;
+                let count = shape.iter().try_fold(1u64, |n, &axis| n.checked_mul(axis));
+                let size = count.and_then(|n| usize::try_from(n).ok()?.checked_mul(field.size));
+                field.size =
+                    size.filter(|&size| size <= 1 << 30).ok_or_else(|| self.error("a smaller shape"))?;
+                let axes: String = shape.iter().map(|axis| format!("{axis}, ")).collect();
+                field.descr = format!("{}, ({axes})", field.descr);
+                field.kind = None;
+            }
+            fields.push(field);
             self.expect(b')')?;
             if !self.eat(b',') {
                 self.expect(b']')?;

@@ -9,11 +9,12 @@ pub(super) use columns::{array_of, columns};
 
 use std::io::{self, Write};
 
-use self::header::{Descr, NpyHeader, NpyKind};
+use self::header::{Descr, NpyField, NpyHeader, NpyKind};
 use super::outgoing::stays_single;
+use super::poses::poses_not_points;
 use super::scalar::Scalar;
 use super::scan::moved;
-use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, axes};
 use crate::Rigid;
 
 const SINGLE: NpyKind = NpyKind { scalar: Scalar::F32, big_endian: false };
@@ -40,14 +41,32 @@ impl CloudFormat for Npy {
     }
 
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
-        let table = NpyTable::parse(bytes)?;
+        let table = NpyTable::parse(bytes, options)?;
         options.check_points(bytes.len(), table.rows)?;
-        let single = table.axes.iter().all(|&axis| table.kinds[axis].scalar.is_single());
-        Ok(Contents { points: table.points(), single, ..Contents::default() })
+        let (shape, plain) = (&table.header.shape, matches!(table.header.descr, Descr::Plain(_)));
+        if plain && options.columns.is_none() && table.cells.len() <= 16 {
+            let rows = (0..table.rows).map(|row| Some(table.row(row)));
+            poses_not_points(rows, table.rows)?;
+        }
+        let single =
+            table.axes.iter().all(|&axis| table.cells[axis].kind.is_some_and(|k| k.scalar.is_single()));
+        let mut contents = Contents { points: table.points(), single, ..Contents::default() };
+        if shape.len() > if plain { 2 } else { 1 } {
+            contents.notes.push(Note::Flattened { shape: shape.clone() });
+        }
+        if let [height, width, _] = shape[..]
+            && plain
+            && height > 1
+            && !table.header.fortran
+        {
+            contents.grid =
+                usize::try_from(width).ok().zip(usize::try_from(height).ok()).map(|(w, h)| [w, h]);
+        }
+        Ok(contents)
     }
 
-    fn attributes(&self, bytes: &[u8], _: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
-        Ok(NpyTable::parse(bytes)?.attributes())
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        Ok(NpyTable::parse(bytes, options)?.attributes())
     }
 
     fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
@@ -76,39 +95,44 @@ impl CloudFormat for Npy {
         motion: &Rigid,
         out: &mut dyn Write,
     ) -> io::Result<()> {
-        let table = NpyTable::parse(bytes)?;
-        options.check_points(bytes.len(), 2 * table.rows)?;
+        let table = NpyTable::parse(bytes, options)?;
+        options.check_points(bytes.len() + table.body.len(), 2 * table.rows)?;
         let old = table.points();
         let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
-        let kind = |axis: usize| table.kinds[table.axes[axis]].scalar;
-        let single = (0..3).all(|axis| kind(axis).is_single()) && stays_single(&old, &new).is_ok();
-        let fits = |axis: usize| kind(axis).for_moved(axis, &old, &new, single) == kind(axis);
+        let kind_of = |axis: usize| table.cells[table.axes[axis]].kind.unwrap_or(DOUBLE);
+        let single = (0..3).all(|axis| kind_of(axis).scalar.is_single()) && stays_single(&old, &new).is_ok();
+        let fits =
+            |axis: usize| kind_of(axis).scalar.for_moved(axis, &old, &new, single) == kind_of(axis).scalar;
         let all_fit = (0..3).all(fits);
         // All columns of a plain array have one type.
-        let kinds: Vec<NpyKind> = match &table.header.descr {
-            _ if all_fit => table.kinds.clone(),
-            Descr::Plain(_) => vec![DOUBLE; table.kinds.len()],
-            Descr::Fields(_) => {
-                let mut kinds = table.kinds.clone();
-                table.axes.iter().for_each(|&axis| kinds[axis].scalar = Scalar::F64);
-                kinds
+        let mut kinds: Vec<Option<NpyKind>> = table.cells.iter().map(|cell| cell.kind).collect();
+        let mut header = table.header.clone();
+        match &mut header.descr {
+            _ if all_fit => {}
+            Descr::Plain(kind) => {
+                *kind = DOUBLE;
+                kinds = vec![Some(DOUBLE); kinds.len()];
             }
-        };
-        let descr = match &table.header.descr {
-            Descr::Plain(_) => Descr::Plain(kinds[0]),
-            Descr::Fields(fields) => Descr::Fields(
-                fields.iter().zip(&kinds).map(|((name, _), &kind)| (name.clone(), kind)).collect(),
-            ),
-        };
+            Descr::Fields(fields) => {
+                for &axis in &table.axes {
+                    let kind = NpyKind { scalar: Scalar::F64, ..kinds[axis].unwrap_or(DOUBLE) };
+                    (kinds[axis], fields[axis].kind) = (Some(kind), Some(kind));
+                    fields[axis].descr = format!("'{}'", kind.name());
+                }
+            }
+        }
         if all_fit {
-            out.write_all(&bytes[..table.header.body])?;
+            out.write_all(&bytes[..header.body])?;
         } else {
-            out.write_all(&NpyHeader::bytes(&descr, table.header.fortran, &table.header.shape))?;
+            out.write_all(&NpyHeader::bytes(&header.descr, header.fortran, &header.shape))?;
         }
         let mut cells: Vec<u8> = Vec::with_capacity(table.body.len());
         table.in_order(|row, column| {
-            let (from, to) = (table.kinds[column], kinds[column]);
             let place = table.place(row, column);
+            let (from, to) = match (table.cells[column].kind, kinds[column]) {
+                (Some(from), Some(to)) => (from, to),
+                _ => return cells.extend_from_slice(&table.body[place..place + table.cells[column].size]),
+            };
             let axis = table.axes.iter().position(|&axis| axis == column);
             let changed = axis.filter(|&axis| new[row][axis] != old[row][axis] && !old[row][axis].is_nan());
             match changed {
@@ -124,14 +148,22 @@ impl CloudFormat for Npy {
     }
 }
 
+/// A column of an array.
+struct Cell {
+    /// The type, where it is one of single numbers.
+    kind: Option<NpyKind>,
+    /// Bytes of a cell, offset of the first one, and step from row to row.
+    size: usize,
+    at: usize,
+    step: usize,
+}
+
 /// The numbers of an array as rows and columns.
 pub(super) struct NpyTable<'a> {
     header: NpyHeader,
     body: &'a [u8],
     rows: usize,
-    kinds: Vec<NpyKind>,
-    /// Of each column: the offset of its first number, and the step from row to row.
-    layout: Vec<(usize, usize)>,
+    cells: Vec<Cell>,
     /// The columns of x, y and z.
     axes: [usize; 3],
 }
@@ -150,42 +182,72 @@ pub(super) fn known(name: &str) -> String {
     }
 }
 
-/// Whether the array at the begin of `bytes` could be a cloud, and how many bytes it takes.
-pub(super) fn cloud_bytes(bytes: &[u8]) -> Option<usize> {
-    let header = NpyHeader::parse(bytes).ok()?;
-    let columns = match (&header.descr, &header.shape[..]) {
-        (Descr::Plain(kind), &[_, columns]) if columns >= 3 => {
-            columns.checked_mul(kind.scalar.size() as u64)?
-        }
-        (Descr::Fields(fields), &[_]) => {
-            let named = ["x", "y", "z"].iter().all(|axis| fields.iter().any(|(name, _)| name == axis));
-            named.then(|| fields.iter().map(|(_, kind)| kind.scalar.size() as u64).sum())?
-        }
-        _ => return None,
+/// Most columns of a row that is a point.
+const MOST_COLUMNS: u64 = 64;
+
+/// Rows and columns of an array of this shape.
+///
+/// # Errors
+/// What is wrong with the shape, and the way out.
+fn rows_and_columns(shape: &[u64], asked: bool) -> Result<(u64, u64), FormatError> {
+    let wrong = |hint: &str| {
+        Err(FormatError::Content(format!(
+            "the array has shape {shape:?}, [points, 3] or wider is expected{hint}"
+        )))
     };
-    usize::try_from(header.shape[0].checked_mul(columns)?).ok()?.checked_add(header.body)
+    let transposed = "; it looks transposed: save `array.T`, or say `--columns 1,2,3` if its rows are points";
+    let (Some(&columns), Some(rows)) =
+        (shape.last(), shape.iter().rev().skip(1).try_fold(1u64, |n, &axis| n.checked_mul(axis)))
+    else {
+        return wrong(", which no memory holds");
+    };
+    match shape {
+        [_] | [] => wrong("; is it a flat list of numbers? Save `array.reshape(-1, 3)`"),
+        [.., 4, 4] if shape.len() > 2 => wrong("; these are poses (4 x 4 matrices), not points"),
+        [3, _] if columns != 3 && columns > 4 && !asked => wrong(transposed),
+        [3, 1 | 2] => wrong("; transpose it"),
+        [4..=16, _] if columns > MOST_COLUMNS && !asked => wrong(transposed),
+        [_, _] if columns >= 3 => Ok((rows, columns)),
+        [.., 3, _] | [3, _, _] if columns != 3 => {
+            wrong("; it looks transposed: the last axis has to be x, y, z")
+        }
+        [_, _, ..] if shape.len() > 2 && (3..=16).contains(&columns) => Ok((rows, columns)),
+        _ => wrong(""),
+    }
+}
+
+/// Whether the array at the begin of `bytes` could be a cloud.
+pub(super) fn could_be_cloud(bytes: &[u8]) -> bool {
+    let Ok(header) = NpyHeader::parse(bytes) else { return false };
+    match &header.descr {
+        Descr::Plain(_) => rows_and_columns(&header.shape, false).is_ok(),
+        Descr::Fields(fields) => matches!(axes::find(&names(fields)), axes::Axes::Found(_)),
+    }
+}
+
+fn names(fields: &[NpyField]) -> Vec<String> {
+    fields.iter().map(|field| field.name.clone()).collect()
 }
 
 impl<'a> NpyTable<'a> {
-    pub fn parse(bytes: &'a [u8]) -> Result<Self, FormatError> {
+    pub fn parse(bytes: &'a [u8], options: &ReadOptions) -> Result<Self, FormatError> {
         let header = NpyHeader::parse(bytes)?;
         let body = &bytes[header.body..];
-        let whole = cloud_bytes(bytes);
         let shape = &header.shape;
-        let (&rows, columns) = match (&header.descr, &shape[..]) {
-            (Descr::Plain(_), [rows, columns]) if *columns >= 3 => (rows, *columns),
-            (Descr::Fields(fields), [rows]) => (rows, fields.len() as u64),
-            _ => {
-                let hint = if shape[..].first() == Some(&3) { "; transpose it" } else { "" };
-                return Err(FormatError::Content(format!(
-                    "the array has shape {shape:?}, [points, 3] or wider is expected{hint}"
-                )));
+        let (rows, width, stride) = match &header.descr {
+            Descr::Plain(kind) => {
+                let (rows, columns) = rows_and_columns(shape, options.columns.is_some())?;
+                (rows, columns, columns.checked_mul(kind.scalar.size() as u64))
+            }
+            Descr::Fields(fields) => {
+                let rows = shape.iter().try_fold(1u64, |n, &axis| n.checked_mul(axis)).unwrap_or(u64::MAX);
+                let stride = fields.iter().try_fold(0u64, |n, field| n.checked_add(field.size as u64));
+                (rows, fields.len() as u64, stride)
             }
         };
-        let Some(expected) = whole.map(|whole| whole - header.body) else {
-            let problem =
-                format!("an array of shape {shape:?} has no fields x, y and z, or no memory holds it");
-            return Err(FormatError::Content(problem));
+        let expected = stride.and_then(|stride| usize::try_from(rows.checked_mul(stride)?).ok());
+        let Some(expected) = expected else {
+            return Err(FormatError::Content(format!("an array of shape {shape:?}, which no memory holds")));
         };
         if expected != body.len() {
             let announced = format!("an array of shape {shape:?} in {expected} bytes");
@@ -193,48 +255,70 @@ impl<'a> NpyTable<'a> {
         }
         // Both are bounded by the bytes that are there, but for arrays without rows.
         let rows = usize::try_from(rows).unwrap_or(0);
-        let columns = if rows == 0 { 3 } else { usize::try_from(columns).unwrap_or(0) };
-        let mut axes = [0, 1, 2];
-        let (mut kinds, mut layout) = (Vec::new(), Vec::new());
-        match &header.descr {
+        let width =
+            if rows == 0 { width.min(MOST_COLUMNS) as usize } else { usize::try_from(width).unwrap_or(0) };
+        let mut cells = Vec::new();
+        let axes = match &header.descr {
             Descr::Plain(kind) => {
                 let size = kind.scalar.size();
-                for column in 0..columns {
-                    kinds.push(*kind);
-                    layout.push(match header.fortran {
-                        true => (column * rows * size, size),
-                        false => (column * size, columns * size),
-                    });
+                options.check_memory("the columns of the array", bytes.len(), width.saturating_mul(64))?;
+                for column in 0..width {
+                    let (at, step) = if header.fortran {
+                        (column * rows * size, size)
+                    } else {
+                        (column * size, width * size)
+                    };
+                    cells.push(Cell { kind: Some(*kind), size, at, step });
+                }
+                match &options.columns {
+                    // Columns without names are named by their numbers.
+                    Some(asked) => {
+                        let numbers: Vec<String> = (1..=width.min(1000)).map(|n| n.to_string()).collect();
+                        axes::choose(&numbers, Some(asked))?
+                    }
+                    None => [0, 1, 2],
                 }
             }
             Descr::Fields(fields) => {
-                let stride = fields.iter().map(|(_, kind)| kind.scalar.size()).sum();
+                let step = fields.iter().map(|field| field.size).sum();
                 let mut at = 0;
-                for (_, kind) in fields {
-                    kinds.push(*kind);
-                    layout.push((at, stride));
-                    at += kind.scalar.size();
+                for field in fields {
+                    cells.push(Cell { kind: field.kind, size: field.size, at, step });
+                    at += field.size;
                 }
-                for (slot, axis) in axes.iter_mut().zip(["x", "y", "z"]) {
-                    *slot = fields.iter().position(|(name, _)| name == axis).unwrap_or(0);
-                }
+                axes::choose(&names(fields), options.columns.as_ref())?
             }
+        };
+        if let Some(&axis) = axes.iter().find(|&&axis| cells[axis].kind.is_none()) {
+            return Err(FormatError::Content(format!(
+                "the field number {} holds no single numbers",
+                axis + 1
+            )));
         }
-        Ok(Self { header, body, rows, kinds, layout, axes })
+        Ok(Self { header, body, rows, cells, axes })
     }
 
     fn place(&self, row: usize, column: usize) -> usize {
-        let (begin, step) = self.layout[column];
-        begin + row * step
+        self.cells[column].at + row * self.cells[column].step
     }
 
     fn points(&self) -> Vec<[f64; 3]> {
-        let value = |row: usize, column: usize| {
-            let kind = self.kinds[column];
-            let number = kind.scalar.get(self.body, self.place(row, column), kind.big_endian);
+        let kinds = self.axes.map(|column| self.cells[column].kind.unwrap_or(DOUBLE));
+        let value = |row: usize, axis: usize| {
+            let number =
+                kinds[axis].scalar.get(self.body, self.place(row, self.axes[axis]), kinds[axis].big_endian);
             number.unwrap_or(f64::NAN)
         };
-        (0..self.rows).map(|row| self.axes.map(|column| value(row, column))).collect()
+        (0..self.rows).map(|row| [value(row, 0), value(row, 1), value(row, 2)]).collect()
+    }
+
+    /// All numbers of a row of a plain array.
+    fn row(&self, row: usize) -> Vec<f64> {
+        let value = |column: usize| {
+            let kind = self.cells[column].kind?;
+            kind.scalar.get(self.body, self.place(row, column), kind.big_endian)
+        };
+        (0..self.cells.len()).map(|column| value(column).unwrap_or(f64::NAN)).collect()
     }
 
     /// The named fields but x, y and z.
@@ -242,17 +326,18 @@ impl<'a> NpyTable<'a> {
         let Descr::Fields(fields) = &self.header.descr else { return Vec::new() };
         let others = fields.iter().enumerate().filter(|(column, _)| !self.axes.contains(column));
         others
-            .map(|(column, (name, kind))| {
+            .filter_map(|(column, NpyField { name, kind, .. })| {
+                let kind = (*kind)?;
                 let places = (0..self.rows).map(|row| self.place(row, column));
                 let values = kind.scalar.column(self.body, kind.big_endian, places);
-                Attribute { name: known(name), values }
+                Some(Attribute { name: known(name), values })
             })
             .collect()
     }
 
     /// Calls `each` with the row and the column of every number, in the order of the file.
     fn in_order(&self, mut each: impl FnMut(usize, usize)) {
-        let columns = self.kinds.len();
+        let columns = self.cells.len();
         if self.header.fortran && matches!(self.header.descr, Descr::Plain(_)) {
             (0..columns).for_each(|column| (0..self.rows).for_each(|row| each(row, column)));
         } else {

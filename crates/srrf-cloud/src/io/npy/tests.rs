@@ -76,7 +76,7 @@ fn bad_arrays() {
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000000, 3), }", "announced"),
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (0, 1000000000000000000), }", ""),
         ("{'descr': '|O', 'fortran_order': False, 'shape': (1, 3), }", "type \"|O\""),
-        ("{'descr': [('x', '<f8', (3,))], 'fortran_order': False, 'shape': (1,), }", "expected"),
+        ("{'descr': [('x', '<f8', (3,))], 'fortran_order': False, 'shape': (1,), }", "announced"),
         ("{'shape': (1, 3)}", "lacks"),
         ("{'descr': '<f8", "end of a string"),
     ] {

@@ -187,7 +187,7 @@ fn field_name(name: &str) -> String {
 
 fn letter(kind: Scalar) -> &'static str {
     match kind {
-        Scalar::F32 | Scalar::F64 => "F",
+        Scalar::F16 | Scalar::F32 | Scalar::F64 => "F",
         Scalar::I8 | Scalar::I16 | Scalar::I32 | Scalar::I64 => "I",
         Scalar::U8 | Scalar::U16 | Scalar::U32 | Scalar::U64 => "U",
     }

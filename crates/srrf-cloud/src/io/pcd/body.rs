@@ -134,7 +134,7 @@ pub(super) fn numbers(
 
 /// The points of a PCD file.
 pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
-    if !bytes.iter().find(|b| !b.is_ascii_whitespace()).is_some_and(|b| b"#VFC".contains(b)) {
+    if !bytes.iter().find(|b| !b.is_ascii_whitespace()).is_some_and(|b| b"#VFCvfc".contains(b)) {
         let begin = quote(&bytes[..bytes.len().min(20)]);
         return Err(FormatError::Content(format!("the file begins with {begin}, not with a PCD header")));
     }

@@ -65,7 +65,7 @@ impl PcdHeader {
             last = line.number;
             let mut tail = line.words();
             let Some((_, key)) = tail.next().filter(|(_, key)| !key.starts_with(b"#")) else { continue };
-            match key {
+            match key.to_ascii_uppercase().as_slice() {
                 b"VERSION" => {}
                 b"VIEWPOINT" => words.viewpoint = viewpoint(tail.map(|(_, word)| word)),
                 b"FIELDS" | b"COLUMNS" => words.fields = tail.map(|(_, word)| word).collect(),
@@ -76,7 +76,7 @@ impl PcdHeader {
                 b"HEIGHT" => words.height = Some(single(&line)?),
                 b"POINTS" => words.points = Some(single(&line)?),
                 b"DATA" => {
-                    let encoding = match tail.next().map(|(_, word)| word) {
+                    let encoding = match tail.next().map(|(_, word)| word.to_ascii_lowercase()).as_deref() {
                         Some(b"ascii") => PcdEncoding::Ascii,
                         // A cut line could be either of the two.
                         _ if lines.offset() == line.start + line.text.len() => break,
@@ -104,7 +104,13 @@ impl PcdHeader {
 
     /// The index of the field of this name.
     pub fn field(&self, name: &str) -> Option<usize> {
-        self.fields.iter().position(|field| field.name == name && field.count == 1)
+        let named = |exact: bool| {
+            let same = |field: &Field| {
+                if exact { field.name == name } else { field.name.eq_ignore_ascii_case(name) }
+            };
+            self.fields.iter().position(|field| same(field) && field.count == 1)
+        };
+        named(true).or_else(|| named(false))
     }
 
     /// The indices of three fields.
@@ -153,7 +159,9 @@ impl Words<'_> {
     fn fields(&self, line: &Line) -> Result<Vec<Field>, FormatError> {
         let n = self.fields.len();
         let counts = if self.counts.is_empty() { vec![1; n] } else { self.counts.clone() };
-        if [self.sizes.len(), self.types.len(), counts.len()] != [n; 3] {
+        // Version .5 has neither sizes nor types: all fields are text of floats.
+        let old = self.sizes.is_empty() && self.types.is_empty();
+        if !old && [self.sizes.len(), self.types.len(), counts.len()] != [n; 3] {
             let problem = format!(
                 "FIELDS names {n} fields, SIZE has {} words, TYPE {}, COUNT {}; they must agree",
                 self.sizes.len(),
@@ -164,9 +172,14 @@ impl Words<'_> {
         }
         let mut fields = Vec::with_capacity(n);
         for (index, name) in self.fields.iter().enumerate() {
-            let (size, kind) = (&self.sizes[index], &self.types[index]);
+            let none = (0..0, &b""[..]);
+            let (size, kind) = match old {
+                true => (&(none.0.clone(), &b"4"[..]), &(none.0.clone(), &b"F"[..])),
+                false => (&self.sizes[index], &self.types[index]),
+            };
+            let kind = (kind.0.clone(), kind.1.to_ascii_uppercase());
             let name = String::from_utf8_lossy(name).into_owned();
-            let scalar = match (kind.1, size.1) {
+            let scalar = match (kind.1.as_slice(), size.1) {
                 (b"F", b"4") => Scalar::F32,
                 (b"F", b"8") => Scalar::F64,
                 (b"I", b"1") => Scalar::I8,

@@ -26,7 +26,7 @@ impl CloudFormat for Pcd {
     }
 
     fn recognises(&self, bytes: &[u8]) -> bool {
-        bytes.starts_with(b"# .PCD") || bytes.starts_with(b"VERSION ") || bytes.starts_with(b"FIELDS ")
+        [&b"# .PCD"[..], b"VERSION ", b"FIELDS ", b"COLUMNS "].iter().any(|word| bytes.starts_with(word))
     }
 
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {

@@ -68,7 +68,9 @@ pub(super) fn rewrite(
     let mut words = Vec::new();
     for change in &changes {
         for (&field, &kind) in change.fields.iter().zip(&change.kinds) {
-            if kind != header.fields[field].scalar {
+            // Version .5 has no words for types.
+            let named = header.fields[field].places[0] != (0..0);
+            if kind != header.fields[field].scalar && named {
                 let [size, name] = header.fields[field].places.clone();
                 words.push((size, kind.size().to_string()));
                 words.push((name, "F".to_owned()));

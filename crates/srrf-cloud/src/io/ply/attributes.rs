@@ -146,7 +146,7 @@ fn word(scalar: Scalar) -> &'static str {
         Scalar::U16 => "ushort",
         Scalar::I32 => "int",
         Scalar::U32 => "uint",
-        Scalar::F32 => "float",
+        Scalar::F16 | Scalar::F32 => "float",
         Scalar::I64 | Scalar::U64 | Scalar::F64 => "double",
     }
 }

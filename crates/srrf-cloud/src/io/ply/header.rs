@@ -30,7 +30,13 @@ pub(super) struct Element {
 impl Element {
     /// The indices of the three properties of these names which are not lists.
     pub fn triple(&self, names: [&str; 3]) -> Option<[usize; 3]> {
-        let find = |name| self.properties.iter().position(|p| p.name == name && p.length.is_none());
+        let find = |name: &str| {
+            let scalar = |p: &&Property| p.length.is_none();
+            let exact = self.properties.iter().position(|p| p.name == name && scalar(&p));
+            exact.or_else(|| {
+                self.properties.iter().position(|p| p.name.eq_ignore_ascii_case(name) && scalar(&p))
+            })
+        };
         let [a, b, c] = names.map(find);
         Some([a?, b?, c?])
     }
@@ -59,13 +65,13 @@ pub(super) struct PlyHeader {
 fn scalar(name: &[u8]) -> Option<Scalar> {
     Some(match name {
         b"char" | b"int8" => Scalar::I8,
-        b"uchar" | b"uint8" => Scalar::U8,
+        b"uchar" | b"uint8" | b"bool" => Scalar::U8,
         b"short" | b"int16" => Scalar::I16,
         b"ushort" | b"uint16" => Scalar::U16,
         b"int" | b"int32" => Scalar::I32,
         b"uint" | b"uint32" => Scalar::U32,
-        b"int64" => Scalar::I64,
-        b"uint64" => Scalar::U64,
+        b"int64" | b"long" | b"longlong" => Scalar::I64,
+        b"uint64" | b"ulong" | b"ulonglong" => Scalar::U64,
         b"float" | b"float32" => Scalar::F32,
         b"double" | b"float64" => Scalar::F64,
         _ => return None,

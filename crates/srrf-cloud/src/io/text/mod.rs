@@ -2,19 +2,22 @@
 
 mod attributes;
 mod row;
+mod title;
 
 use std::io::{self, Write};
 
 pub(super) use self::attributes::fits_single;
 use self::attributes::{ColumnCollector, OtherColumns};
 use self::row::{Style, TextRow};
-use super::scan::{ByteLines, Line, Splice, moved};
-use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
+use self::title::{Heads, is_comment, is_title};
+use super::poses::poses_not_points;
+use super::scan::{ByteLines, Line, Splice, moved, number};
+use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// Numbers separated by spaces, tabs, commas or semicolons, a line for each point. x, y and z are
-/// the columns that the title names so, otherwise the first three. Empty lines and those that begin
-/// with `#` or `//` are passed over, and so is a first line that is a title or (as in PTS files) the
+/// the columns that [`ReadOptions::columns`] or the title name, otherwise the first three. Empty lines and those that
+/// begin with `#`, `//` or `%` are passed over, and so is a first line that is a title or (as in PTS files) the
 /// number of points. Decimal commas are read where semicolons, tabs or spaces separate the fields;
 /// where commas separate, they are refused as far as they can be told from separators. A moved copy
 /// keeps all other columns as they are, normals too.
@@ -36,26 +39,42 @@ impl CloudFormat for Text {
             begin = &begin[..whole_lines.unwrap_or(begin.len())];
         }
         let mut rows = 0;
-        parse(begin, |_, _| {
+        let parsed = parse(begin, &ReadOptions::default(), |_, _| {
             rows += 1;
             Ok::<_, FormatError>(())
-        })
-        .is_ok()
-            && rows > 0
+        });
+        // A title that does not say the columns is a title all the same.
+        matches!(parsed, Err(FormatError::Unclear { .. })) || (parsed.is_ok() && rows > 0)
     }
 
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
         let mut points = Vec::new();
-        let announced = parse(bytes, |_, row| {
+        let mut poses = PoseRows::new(options);
+        let parsed = parse(bytes, options, |line, row| {
             options.grow("the points", bytes.len(), &mut points)?;
             points.push(row.point);
+            poses.add(line.text);
             Ok::<_, FormatError>(())
         })?;
-        match announced {
+        poses.check()?;
+        if points.len() <= 3 && parsed.width > MOST_COLUMNS && options.columns.is_none() {
+            return Err(FormatError::unclear(
+                format!(
+                    "{} rows of {} numbers look transposed; save the transpose, a point a line, or if a row is a point",
+                    points.len(),
+                    parsed.width
+                ),
+                "--columns",
+            ));
+        }
+        match parsed.announced {
             Some(count) if points.len() != count => {
                 Err(FormatError::truncated(format!("{count} points"), points.len().to_string()))
             }
-            _ => Ok(Contents::of_points(points)),
+            _ => {
+                let notes = if parsed.numbered { vec![Note::NumberedTitle] } else { Vec::new() };
+                Ok(Contents { notes, ..Contents::of_points(points) })
+            }
         }
     }
 
@@ -86,7 +105,7 @@ impl CloudFormat for Text {
     /// A `.csv` has a title and commas, a `.pts` its count, an `.xyz` spaces; any text will do elsewhere.
     fn conforms(&self, bytes: &[u8], extension: &str) -> bool {
         let mut first = None;
-        let announced = parse(bytes, |line, row| {
+        let announced = parse(bytes, &ReadOptions::default(), |line, row| {
             first.get_or_insert((line.start, row.style));
             Ok::<_, FormatError>(())
         });
@@ -97,7 +116,7 @@ impl CloudFormat for Text {
                 matches!(style, Style::Comma | Style::Semicolon)
                     && ByteLines::new(head).any(|line| is_title(line.text))
             }
-            "pts" => style == Style::Space && matches!(announced, Ok(Some(_))),
+            "pts" => style == Style::Space && announced.is_ok_and(|parsed| parsed.announced.is_some()),
             "xyz" => {
                 let passed_over = |text: &[u8]| text.trim_ascii().is_empty() || is_comment(text);
                 style == Style::Space && ByteLines::new(head).all(|line| passed_over(line.text))
@@ -115,7 +134,7 @@ impl CloudFormat for Text {
     ) -> io::Result<()> {
         self.read(bytes, options)?;
         let mut splice = Splice::new(bytes, out);
-        parse(bytes, |line, row| {
+        parse(bytes, options, |line, row| {
             splice.decimal_comma = match row.style {
                 Style::Space | Style::Comma => false,
                 Style::SpaceDecimalComma => true,
@@ -132,24 +151,40 @@ impl CloudFormat for Text {
 fn other_columns(bytes: &[u8], options: &ReadOptions) -> Result<OtherColumns, FormatError> {
     let mut collector = ColumnCollector::default();
     let announced =
-        parse(bytes, |line, row| collector.take(line.start, line.text, &row, bytes.len(), options))?;
-    Ok(collector.finish(bytes, announced.is_some()))
+        parse(bytes, options, |line, row| collector.take(line.start, line.text, &row, bytes.len(), options))?;
+    Ok(collector.finish(bytes, announced.announced.is_some()))
 }
 
-/// Goes through the points; the number of them that the first line announces.
+/// More columns than points have.
+const MOST_COLUMNS: usize = 64;
+
+/// What a text says besides its points.
+#[derive(Default)]
+struct Parsed {
+    /// The number of points that the first line announces.
+    announced: Option<usize>,
+    /// Whether the title was 0, 1, 2 and so on.
+    numbered: bool,
+    /// Fields of the first row.
+    width: usize,
+}
+
+/// Goes through the points.
 fn parse<E: From<FormatError>>(
     bytes: &[u8],
+    options: &ReadOptions,
     mut each: impl FnMut(&Line, TextRow) -> Result<(), E>,
-) -> Result<Option<usize>, E> {
+) -> Result<Parsed, E> {
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err(FormatError::Content("the text is UTF-16; save it as UTF-8 or ASCII".into()).into());
     }
-    let mut announced = None;
+    let mut parsed = Parsed::default();
     let mut columns = [0, 1, 2];
-    let mut title: Option<Line> = None;
+    let mut heads = Heads::default();
     let mut rows = 0usize;
     let mut whole = None;
-    for mut line in ByteLines::new(bytes) {
+    let mut lines = ByteLines::new(bytes);
+    while let Some(mut line) = lines.next() {
         if line.number == 1 && line.text.starts_with("\u{feff}".as_bytes()) {
             line = Line { start: 3, text: &line.text[3..], ..line };
         }
@@ -157,25 +192,42 @@ fn parse<E: From<FormatError>>(
         if trimmed.is_empty() {
             continue;
         }
-        if trimmed.starts_with(b"#") || trimmed.starts_with(b"//") {
-            title = if rows == 0 { Some(line) } else { title };
+        if is_comment(trimmed) {
+            if rows == 0 {
+                heads.comments.push(line.text);
+                if heads.comments.len() > MOST_COLUMNS {
+                    heads.comments.remove(0);
+                }
+            }
             continue;
         }
-        if rows == 0 && announced.is_none() {
-            if let Some(count) = std::str::from_utf8(trimmed).ok().and_then(|word| word.parse().ok()) {
-                announced = Some(count);
+        if rows == 0 {
+            if parsed.announced.is_none()
+                && let Some(count) = std::str::from_utf8(trimmed).ok().and_then(|word| word.parse().ok())
+            {
+                parsed.announced = Some(count);
                 continue;
             }
-            if is_title(line.text) {
-                if title.is_some_and(|title| is_title(title.text) && !is_comment(title.text)) {
+            let next = lines.clone().next().map_or(&b""[..], |line| line.text);
+            let numbered = heads.title.is_none() && title::is_numbered(line.text, next);
+            if numbered || is_title(line.text) {
+                if heads.title.is_some() {
                     return Err(line.error("a second title; a point is expected").into());
                 }
-                title = Some(line);
+                heads.title = Some(line.text);
+                parsed.numbered = numbered;
                 continue;
             }
-        }
-        if rows == 0 {
-            columns = title.and_then(|title| named_columns(title.text, line.text)).unwrap_or(columns);
+            parsed.width = title::width(line.text);
+            columns = match parsed.numbered {
+                true => {
+                    let index = usize::from(
+                        heads.title.is_some_and(|title| title.trim_ascii_start().starts_with(b",")),
+                    );
+                    [index, index + 1, index + 2]
+                }
+                false => title::columns_of(&heads, &line, next, options)?,
+            };
         }
         let row = TextRow::parse(line.text, columns).map_err(|problem| line.error(problem))?;
         if let Some(count) = row.whole_numbers(line.text)
@@ -188,36 +240,39 @@ fn parse<E: From<FormatError>>(
         rows += 1;
         each(&line, row)?;
     }
-    Ok(announced)
+    Ok(parsed)
 }
 
-fn is_comment(text: &[u8]) -> bool {
-    let text = text.trim_ascii();
-    text.starts_with(b"#") || text.starts_with(b"//")
+/// Rows that may be poses instead of points.
+struct PoseRows {
+    rows: Option<Vec<Option<Vec<f64>>>>,
 }
 
-/// A line whose first three fields are words, such as `x,y,z`.
-fn is_title(text: &[u8]) -> bool {
-    let mut fields = Style::of(text).fields(text).take(3);
-    let word = |field: &[u8]| {
-        field.first().is_some_and(|b| b.is_ascii_alphabetic() || !b.is_ascii() || b"\"_#/".contains(b))
-    };
-    fields.by_ref().all(|(_, field)| word(field) && super::scan::number(field).is_err())
-}
-
-/// Which columns a title names `x`, `y` and `z`, if it names as many as the first line of numbers
-/// has.
-fn named_columns(title: &[u8], first: &[u8]) -> Option<[usize; 3]> {
-    let bare = title.trim_ascii();
-    let bare = bare.strip_prefix(b"//").unwrap_or(bare);
-    let bare = bare.strip_prefix(b"#").unwrap_or(bare);
-    let names: Vec<&[u8]> = Style::of(bare).fields(bare).map(|(_, name)| name).collect();
-    let style = Style::of(first);
-    if names.len() != style.fields(first).count() {
-        return None;
+impl PoseRows {
+    fn new(options: &ReadOptions) -> Self {
+        Self { rows: options.columns.is_none().then(Vec::new) }
     }
-    let find = |axis: &[u8]| names.iter().position(|name| name.eq_ignore_ascii_case(axis));
-    Some([find(b"x")?, find(b"y")?, find(b"z")?])
+
+    fn add(&mut self, line: &[u8]) {
+        let Some(rows) = &mut self.rows else { return };
+        let fields = Style::of(line).fields(line).map(|(_, field)| number(field).ok());
+        let row: Option<Vec<f64>> = fields.take(17).collect();
+        let usual = row.as_ref().is_some_and(|row| matches!(row.len(), 4 | 7 | 8 | 12 | 16));
+        rows.push(row);
+        // Poses look like poses from the first few rows on.
+        let short = rows.len() <= 4;
+        let looks = || poses_not_points(rows.iter().cloned(), rows.len()).is_err();
+        if !usual || (!short && rows.len().is_power_of_two() && !looks()) {
+            self.rows = None;
+        }
+    }
+
+    fn check(self) -> Result<(), FormatError> {
+        self.rows.map_or(Ok(()), |rows| {
+            let count = rows.len();
+            poses_not_points(rows.into_iter(), count)
+        })
+    }
 }
 
 /// The first three numbers of a line.
@@ -263,6 +318,7 @@ mod tests {
         assert!(read("1 2 x3").is_err());
         assert!(matches!(read("3\n1 2 3\n4 5 6"), Err(FormatError::Truncated { .. })));
         assert!(read("1\n1 2 3\n4 5 6").is_err());
+        assert!(read("a b c\n1 2 3").unwrap_err().to_string().contains("columns are a, b, c"));
         assert!(read("a b c\nd e f\n1 2 3").unwrap_err().to_string().contains("line 2"));
         assert!(read("1,5,2,5,3,5\n1,2,5,3,5\n").unwrap_err().to_string().contains("line 2"));
         assert!(points_of(&Text, &[0xff, 0xfe, 0x31, 0x00]).unwrap_err().to_string().contains("UTF-16"));

@@ -1,0 +1,141 @@
+//! The title of a text, and which columns are the points.
+
+use super::super::scan::{Line, number, words};
+use super::super::{FormatError, ReadOptions, axes};
+use super::row::Style;
+
+/// Longest line that may be a title.
+const LONGEST: usize = 1 << 20;
+
+/// What stands before the first point.
+#[derive(Default)]
+pub(super) struct Heads<'a> {
+    /// A line of words that is no comment.
+    pub title: Option<&'a [u8]>,
+    /// Comments, the last ones.
+    pub comments: Vec<&'a [u8]>,
+}
+
+/// Without the mark of a comment.
+fn uncommented(text: &[u8]) -> &[u8] {
+    let text = text.trim_ascii();
+    text.iter().position(|b| !b"#/%".contains(b)).map_or(&text[..0], |at| text[at..].trim_ascii())
+}
+
+/// Whether a line begins as a comment.
+pub(super) fn is_comment(text: &[u8]) -> bool {
+    let text = text.trim_ascii();
+    text.starts_with(b"#") || text.starts_with(b"//") || text.starts_with(b"%")
+}
+
+/// Whether a line is made of words, and of no number.
+pub(super) fn is_title(text: &[u8]) -> bool {
+    if text.len() > LONGEST || text.iter().any(|b| b.is_ascii_control() && *b != b'\t') {
+        return false;
+    }
+    let mut fields = Style::of(text).fields(text).filter(|(_, field)| !field.is_empty()).peekable();
+    let word = |field: &[u8]| {
+        field.first().is_some_and(|b| b.is_ascii_alphabetic() || !b.is_ascii() || b"\"'_#/[(".contains(b))
+    };
+    fields.peek().is_some() && fields.all(|(_, field)| word(field) && number(field).is_err())
+}
+
+/// Whether a line is 0, 1, 2 and so on, as pandas titles columns without names, and `next` is made of decimals.
+pub(super) fn is_numbered(text: &[u8], next: &[u8]) -> bool {
+    if text.len() > LONGEST || !text.contains(&b',') {
+        return false;
+    }
+    let mut fields: Vec<&[u8]> = Style::Comma.fields(text).map(|(_, field)| field).collect();
+    let index = fields.first().is_some_and(|field| field.is_empty());
+    if index {
+        fields.remove(0);
+    }
+    let in_turn = fields.iter().enumerate().all(|(n, field)| *field == n.to_string().as_bytes());
+    fields.len() >= 3 && in_turn && (index || next.contains(&b'.'))
+}
+
+/// The names in a title.
+pub(super) fn names(title: &[u8]) -> Vec<String> {
+    let text = uncommented(title);
+    let separator = [b';', b'\t', b','].into_iter().find(|byte| text.contains(byte));
+    let name = |word: &[u8]| String::from_utf8_lossy(word.trim_ascii()).trim_matches('"').trim().to_owned();
+    let mut names: Vec<String> = match separator {
+        Some(separator) => text.split(|&byte| byte == separator).map(name).collect(),
+        None => {
+            let mut names: Vec<String> = Vec::new();
+            for (_, word) in words(text) {
+                // `x [m]` is one name.
+                match names.last_mut().filter(|_| word.starts_with(b"[") || word.starts_with(b"(")) {
+                    Some(last) => last.push_str(&format!(" {}", name(word))),
+                    None => names.push(name(word)),
+                }
+            }
+            names
+        }
+    };
+    while names.last().is_some_and(String::is_empty) {
+        names.pop();
+    }
+    names
+}
+
+/// Fields of a row, those apart that are empty at its end.
+pub(super) fn width(text: &[u8]) -> usize {
+    let fields = Style::of(text).fields(text).enumerate();
+    fields.filter(|(_, (_, field))| !field.is_empty()).last().map_or(0, |(index, _)| index + 1)
+}
+
+/// The columns of x, y and z, from what stands before the `first` point and the line after it.
+///
+/// # Errors
+/// [`FormatError`] where a title does not say them.
+pub(super) fn columns_of(
+    heads: &Heads,
+    first: &Line,
+    next: &[u8],
+    options: &ReadOptions,
+) -> Result<[usize; 3], FormatError> {
+    let width = width(first.text);
+    let shift = |names: &[String]| usize::from(width == names.len() + 1 && has_index(first.text, next));
+    let asked = options.columns.as_ref();
+    if let Some(title) = heads.title {
+        let names = names(title);
+        if names.len() >= 3 {
+            let shift = shift(&names);
+            return axes::choose(&names, asked).map(|axes| axes.map(|axis| axis + shift));
+        }
+    }
+    for comment in heads.comments.iter().rev().filter(|comment| comment.len() < LONGEST) {
+        let names = names(comment);
+        let fits = names.len() == width || names.len() + 1 == width || (names.len() > width && width >= 3);
+        match axes::find(&names) {
+            axes::Axes::Found(axes) if fits && asked.is_none() && axes.iter().all(|&axis| axis < width) => {
+                let shift = shift(&names);
+                return Ok(axes.map(|axis| axis + shift));
+            }
+            axes::Axes::Degrees if names.len() == width => return axes::choose(&names, asked),
+            _ if asked.is_some() && names.len() == width => return axes::choose(&names, asked),
+            _ => {}
+        }
+    }
+    match asked {
+        Some(_) => axes::choose(&(1..=width.min(1000)).map(|n| n.to_string()).collect::<Vec<_>>(), asked),
+        None => Ok([0, 1, 2]),
+    }
+}
+
+/// Whether rows begin with their number or a name that the title does not count.
+fn has_index(first: &[u8], next: &[u8]) -> bool {
+    let begin = |text: &[u8]| {
+        let field = Style::of(text).fields(text).next()?.1.to_vec();
+        String::from_utf8(field).ok()
+    };
+    match (begin(first), begin(next)) {
+        (Some(a), Some(b)) => match (a.parse::<u64>(), b.parse::<u64>()) {
+            (Ok(a), Ok(b)) => a <= 1 && b == a + 1,
+            _ => number(a.as_bytes()).is_err(),
+        },
+        (Some(a), None) => number(a.as_bytes()).is_err(),
+        _ => false,
+    }
+}
