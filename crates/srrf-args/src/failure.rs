@@ -86,6 +86,7 @@ impl From<IoError> for Failure {
             }
             IoError::Cloud { source, .. } => way_out(source),
             IoError::UnknownFormat { .. }
+            | IoError::Foreign { .. }
             | IoError::LeftOut { .. }
             | IoError::OtherFormat { .. }
             | IoError::NotFinite { .. } => "",
