@@ -276,9 +276,7 @@ fn numbers_beyond_measure_are_an_error() {
         let huge = placed(&good, factor, [0.0; 3]);
         for (source, target) in [(&huge, &huge), (&huge, &good), (&good, &huge)] {
             let error = network.register(source, target).unwrap_err();
-            let (RegisterError::Source(why) | RegisterError::Target(why)) = error else {
-                panic!("{error:?}")
-            };
+            let (RegisterError::Source(why) | RegisterError::Target(why)) = &error else { panic!("{error}") };
             assert!(matches!(why, CloudError::OutOfRange { .. }), "{factor:e}: {why:?}");
         }
     }

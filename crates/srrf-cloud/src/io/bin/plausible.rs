@@ -41,7 +41,7 @@ pub(super) fn find(bytes: &[u8]) -> Result<PointLayout, FormatError> {
     let fits: Vec<(PointLayout, f64)> = layouts
         .into_iter()
         .filter(|layout| layout.double == double)
-        .filter_map(|layout| Some((layout, Table::new(bytes, layout).evidence()?)))
+        .filter_map(|layout| Some((layout, PlausibleRows::new(bytes, layout).evidence()?)))
         .collect();
     let proven: Vec<PointLayout> =
         fits.iter().filter(|(_, evidence)| *evidence >= PROOF).map(|(layout, _)| *layout).collect();
@@ -82,12 +82,12 @@ fn are_singles(bytes: &[u8]) -> bool {
 }
 
 /// The numbers of a file in rows.
-struct Table<'a> {
+struct PlausibleRows<'a> {
     bytes: &'a [u8],
     layout: PointLayout,
 }
 
-impl<'a> Table<'a> {
+impl<'a> PlausibleRows<'a> {
     fn new(bytes: &'a [u8], layout: PointLayout) -> Self {
         Self { bytes, layout }
     }

@@ -149,7 +149,7 @@ impl CloudFormat for Npy {
 }
 
 /// A column of an array.
-struct Cell {
+struct ArrayCell {
     /// The type, where it is one of single numbers.
     kind: Option<NpyKind>,
     /// Bytes of a cell, offset of the first one, and step from row to row.
@@ -163,7 +163,7 @@ pub(super) struct NpyTable<'a> {
     header: NpyHeader,
     body: &'a [u8],
     rows: usize,
-    cells: Vec<Cell>,
+    cells: Vec<ArrayCell>,
     /// The columns of x, y and z.
     axes: [usize; 3],
 }
@@ -268,7 +268,7 @@ impl<'a> NpyTable<'a> {
                     } else {
                         (column * size, width * size)
                     };
-                    cells.push(Cell { kind: Some(*kind), size, at, step });
+                    cells.push(ArrayCell { kind: Some(*kind), size, at, step });
                 }
                 match &options.columns {
                     // Columns without names are named by their numbers.
@@ -283,7 +283,7 @@ impl<'a> NpyTable<'a> {
                 let step = fields.iter().map(|field| field.size).sum();
                 let mut at = 0;
                 for field in fields {
-                    cells.push(Cell { kind: field.kind, size: field.size, at, step });
+                    cells.push(ArrayCell { kind: field.kind, size: field.size, at, step });
                     at += field.size;
                 }
                 axes::choose(&names(fields), options.columns.as_ref())?

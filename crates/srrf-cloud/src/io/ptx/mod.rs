@@ -17,7 +17,7 @@ pub(super) struct Ptx;
 
 /// What is read of a file.
 #[derive(Default)]
-struct Scans {
+struct PtxScans {
     points: Vec<[f64; 3]>,
     headers: Vec<PtxHeader>,
     /// Intensity, red, green, blue, as far as all points have them.
@@ -142,16 +142,16 @@ fn matrix(pose: &Rigid) -> String {
     text
 }
 
-fn read(bytes: &[u8], options: &ReadOptions, values: bool) -> Result<Scans, FormatError> {
+fn read(bytes: &[u8], options: &ReadOptions, values: bool) -> Result<PtxScans, FormatError> {
     let wanted = options.scan;
-    let scans = std::cell::RefCell::new(Scans::default());
+    let scans = std::cell::RefCell::new(PtxScans::default());
     let header = |index: usize, header: &PtxHeader| {
         scans.borrow_mut().headers.push(header.clone());
         Ok::<_, FormatError>(wanted.is_none_or(|number| number == index + 1))
     };
     let row = |row: &PtxRow| {
         let mut scans = scans.borrow_mut();
-        let Scans { points, headers, values: lists, columns } = &mut *scans;
+        let PtxScans { points, headers, values: lists, columns } = &mut *scans;
         options.grow("the points", bytes.len(), points)?;
         let pose = headers.last().map(|header| &header.file_from_scan);
         let point = row.point().zip(pose).map_or([f64::NAN; 3], |(point, pose)| {

@@ -9,7 +9,7 @@ use std::io::{self, Write};
 pub(super) use self::attributes::fits_single;
 use self::attributes::{ColumnCollector, OtherColumns};
 use self::row::{Style, TextRow};
-use self::title::{Heads, is_comment, is_title};
+use self::title::{TitleNames, is_comment, is_title};
 use super::poses::poses_not_points;
 use super::scan::{ByteLines, Line, Splice, moved, number};
 use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
@@ -180,7 +180,7 @@ fn parse<E: From<FormatError>>(
     }
     let mut parsed = Parsed::default();
     let mut columns = [0, 1, 2];
-    let mut heads = Heads::default();
+    let mut heads = TitleNames::default();
     let mut rows = 0usize;
     let mut whole = None;
     let mut lines = ByteLines::new(bytes);

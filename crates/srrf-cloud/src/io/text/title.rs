@@ -9,7 +9,7 @@ const LONGEST: usize = 1 << 20;
 
 /// What stands before the first point.
 #[derive(Default)]
-pub(super) struct Heads<'a> {
+pub(super) struct TitleNames<'a> {
     /// A line of words that is no comment.
     pub title: Option<&'a [u8]>,
     /// Comments, the last ones.
@@ -90,7 +90,7 @@ pub(super) fn width(text: &[u8]) -> usize {
 /// # Errors
 /// [`FormatError`] where a title does not say them.
 pub(super) fn columns_of(
-    heads: &Heads,
+    heads: &TitleNames,
     first: &Line,
     next: &[u8],
     options: &ReadOptions,
