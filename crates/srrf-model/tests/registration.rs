@@ -280,7 +280,6 @@ fn numbers_beyond_measure_are_an_error() {
             assert!(matches!(why, CloudError::OutOfRange { .. }), "{factor:e}: {why:?}");
         }
     }
-    // Large and small ones are in order.
     for factor in [1e99, 1e-99] {
         let cloud = placed(&good, factor, [0.0; 3]);
         assert!(network.register(&cloud, &cloud).is_ok());

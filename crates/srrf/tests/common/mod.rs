@@ -117,8 +117,9 @@ impl Done {
 
 /// A pose from text as `numpy.loadtxt` would read it: rows of numbers.
 pub fn pose_of(text: &str) -> Rigid {
+    let lines = text.lines().filter(|l| !l.starts_with('#'));
     let rows: Vec<Vec<f64>> =
-        text.lines().map(|l| l.split_whitespace().map(|w| w.parse().unwrap()).collect()).collect();
+        lines.map(|l| l.split_whitespace().map(|w| w.parse().unwrap()).collect()).collect();
     pose_of_rows(&rows)
 }
 
