@@ -263,7 +263,7 @@ def building(args, small):
 def many(args, small):
     folder = args.out / "many"
     truth = make_scene(args.scenes, "corridor", folder / "scans", scans=40 if small else 500, points=4000 if small else 20000, seed=args.seed)
-    result = align(args.srrf, folder / "scans", folder, "--max-memory", "4")
+    result = align(args.srrf, folder / "scans", folder, "--max-memory", "4G")
     return [srrf_line("many", result, truth, 2.0, 0.3)]
 
 

@@ -6,7 +6,7 @@ use clap::{Arg, Command};
 
 /// Flags that say what a verb writes or draws: each verb says it of its own output. Their value is the same
 /// everywhere but for a folder instead of a file.
-const OF_THE_VERB: [&str; 2] = ["output", "json"];
+const OF_THE_VERB: [&str; 8] = ["output", "json", "html", "png", "save", "initial", "max-memory", "up"];
 
 /// The four programs with all their verbs, by name.
 fn verbs() -> Vec<(String, Command)> {

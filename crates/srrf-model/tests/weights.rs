@@ -192,7 +192,7 @@ fn files_of_other_programs_are_named() {
     let changes: [(&str, Change); 10] = [
         ("dense.sfe.heads", |c| c.dense.sfe.heads = 0),
         ("skeleton.pfi.heads", |c| c.skeleton.pfi.heads = 7),
-        ("skeleton.sfe", |c| c.skeleton.sfe.layers = 0),
+        ("skeleton.sfe.layers", |c| c.skeleton.sfe.layers = 0),
         ("sem.levels", |c| c.sem.levels.clear()),
         ("sem.levels[1].widths", |c| c.sem.levels[1].widths = vec![13, 0]),
         ("sem.skeleton_points", |c| c.sem.skeleton_points = 2),

@@ -161,7 +161,7 @@ fn bad_use_says_what_to_do() {
     error(&["source.ply", "target.ply", "-o", "none/p.json"], "does not exist; create it first");
     error(&["source.ply", "target.ply", "-o", "-", "--tum", "-"], "name files for the others");
     error(&["source.ply", "target.ply", "--voxel", "0.1"], "--save");
-    error(&["source.ply", "target.ply", "--max-memory", "0"], "a number above 0");
+    error(&["source.ply", "target.ply", "--max-memory", "0"], "a size of memory");
     error(&["source.ply", "target.ply", "--sequence", "--all-pairs"], "one of them");
     error(&["--add", "gone.json", "source.ply"], "should be what --output wrote");
     scene.file("poses.txt", "1 2 3\n");

@@ -72,7 +72,11 @@ fn options_that_make_no_sense() {
     let scene = Scene::new(200);
     scene.file("scaled.txt", "1 0 0 0\n0 2 0 0\n0 0 1 0\n0 0 0 1\n");
     let register = |more: &[&str]| scene.srrf(&[&["register", "source.ply", "target.ply"], more].concat());
-    says(&register(&["--initial", "scaled.txt"]), 2, &["scaled.txt", "line 2", "length 2", "rigid motion"]);
+    says(
+        &register(&["--initial", "scaled.txt"]),
+        2,
+        &["scaled.txt", "lengths [1.0, 2.0, 1.0]", "neither scale nor shear"],
+    );
     says(&register(&["--initial", "gone.txt"]), 2, &["gone.txt", "4 rows of 4"]);
     says(&register(&["--weights", "srrf-huge"]), 2, &["srrf-huge", "srrf-small"]);
     says(&register(&["--weights", "source.ply"]), 2, &["source.ply", "safetensors"]);

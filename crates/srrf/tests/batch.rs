@@ -132,10 +132,10 @@ fn shards_in_any_format_join_to_the_whole() {
         assert_eq!(again.code, done.code, "{again:?}");
     }
     let merged =
-        scene.srrf(&["batch", "merge", "c.parquet", "a.jsonl", "-o", "ab.csv", "--list", "pairs.jsonl"]);
+        scene.srrf(&["batch", "merge", "c.parquet", "a.jsonl", "-o", "ab.csv", "--order", "pairs.jsonl"]);
     assert!(merged.code == 0 && merged.out.contains("of the list are missing"), "{merged:?}");
     for (from, to) in [(["ab.csv", "b.csv"], "d.parquet"), (["d.parquet", "a.jsonl"], "e.jsonl")] {
-        let merged = scene.srrf(&["batch", "merge", from[0], from[1], "-o", to, "--list", "pairs.jsonl"]);
+        let merged = scene.srrf(&["batch", "merge", from[0], from[1], "-o", to, "--order", "pairs.jsonl"]);
         assert!(
             merged.code == 0 && merged.out.contains("10 pairs in") && !merged.out.contains("missing"),
             "{merged:?}"

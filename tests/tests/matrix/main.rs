@@ -107,7 +107,8 @@ fn the_order_of_the_points_does_not_matter() {
     let gaps = cases().iter().map(|case| {
         (case.name, gap(&pose(case, &source, &target), &pose(case, &other_source, &other_target)))
     });
-    all_within(1e-3, gaps);
+    // In single precision; equi-gspr sums over neighbours in the order of the points.
+    all_within(4e-3, gaps);
 }
 
 #[test]

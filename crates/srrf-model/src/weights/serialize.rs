@@ -70,7 +70,5 @@ mod tests {
         let (length, metadata) = SafeTensors::read_metadata(&first).unwrap();
         assert_eq!(length % 8, 0);
         assert_eq!(metadata.metadata().as_ref().unwrap()["key 3"], "\"3\"\n");
-        let none = serialize(Vec::<(String, TensorView<'_>)>::new(), &BTreeMap::new()).unwrap();
-        assert_eq!(SafeTensors::deserialize(&none).unwrap().len(), 0);
     }
 }

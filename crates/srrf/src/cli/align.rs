@@ -9,6 +9,7 @@ use clap::Args;
 use srrf::{Options, Registrar};
 use srrf_align::{AlignError, AlignOptions, AlignProgress, AlignStage, Map};
 use srrf_args::flags::{Common, value};
+use srrf_args::numbers::bytes;
 use srrf_args::words::{count, counted, length};
 use srrf_args::{Failure, Output, OutputKind, Places, Progress, files, interrupt};
 use srrf_cloud::io::{ReadOptions, is_cloud_file};
@@ -83,9 +84,9 @@ pub struct AlignArgs {
     #[arg(long)]
     all_pairs: bool,
 
-    /// Memory to keep within, in GB: scans that do not fit are read again when they are needed
-    #[arg(long, value_name = "GB", value_parser = gigabytes)]
-    max_memory: Option<f64>,
+    /// Memory to keep within, such as `4G`: scans that do not fit are read again when they are needed
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    max_memory: Option<u64>,
 
     /// Leave out the joint refinement on the points
     #[arg(long)]
@@ -96,13 +97,6 @@ pub struct AlignArgs {
 
     #[command(flatten)]
     common: Common,
-}
-
-fn gigabytes(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("a number above 0, such as 4 or 0.5".into()),
-    }
 }
 
 /// Aligns.
@@ -194,7 +188,7 @@ impl AlignArgs {
 
     fn open(&self, known: Option<&EarlierMap>) -> Result<ScanFiles, Failure> {
         let before: Vec<PathBuf> = known.map_or_else(Vec::new, EarlierMap::paths);
-        let budget = self.max_memory.map(|gb| gb * 1e9);
+        let budget = self.max_memory.map(|bytes| bytes as f64);
         ScanFiles::open(&before, &self.scans, budget, &ReadOptions::default())
     }
 

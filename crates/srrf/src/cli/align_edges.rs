@@ -196,6 +196,6 @@ mod tests {
         assert!(error(&line_of("aa", "bb", &pose, "p")).1.contains("other options"));
         assert!(error(&text.replace("0.9", "1.9")).1.contains("probability of 1.9"));
         let sheared = text.replace("[0.0,1.0,0.0,0.0]", "[0.0,2.0,0.0,0.0]");
-        assert!(error(&sheared).1.contains("length 2"), "{:?}", error(&sheared));
+        assert!(error(&sheared).1.contains("neither scale nor shear"), "{:?}", error(&sheared));
     }
 }

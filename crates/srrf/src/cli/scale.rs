@@ -44,7 +44,7 @@ pub struct ScaleArgs {
 
     /// Multiply the source by this factor before it is moved; `auto` estimates it [default: 1, and an error where the
     /// clouds seem to be in different units]
-    #[arg(long, value_name = "FACTOR|auto", allow_negative_numbers = true)]
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     scale: Option<ScaleChoice>,
 }
 

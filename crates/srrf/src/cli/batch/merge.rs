@@ -26,7 +26,7 @@ pub struct MergeArgs {
 
     /// The list whose order they get; pairs that are missing are counted
     #[arg(long, value_name = value::FILE)]
-    list: Option<PathBuf>,
+    order: Option<PathBuf>,
 
     #[command(flatten)]
     quiet: Quiet,
@@ -37,13 +37,13 @@ pub struct MergeArgs {
 /// # Errors
 /// [`Failure`], with its exit code.
 pub fn merge(args: &MergeArgs) -> Result<ExitCode, Failure> {
-    let mut places = Places::new().reads("--list", args.list.as_deref());
+    let mut places = Places::new().reads("--order", args.order.as_deref());
     for results in &args.results {
         places = places.reads("the results", &**results);
     }
     places.writes("--output", &*args.output, RESULTS)?.check()?;
     let _lock = OutputLock::take(&args.output)?;
-    let listed = args.list.as_deref().map(PairList::read).transpose()?;
+    let listed = args.order.as_deref().map(PairList::read).transpose()?;
     let ids: Vec<&str> = listed.iter().flat_map(|list| &list.rows).map(|pair| &*pair.id).collect();
     let pairs = results::join(&args.results, &ids, &args.output)?;
     let out = Output::new(args.quiet.quiet, false);
