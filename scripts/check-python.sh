@@ -3,7 +3,7 @@
 #
 #   scripts/check-python.sh [--quick] [--profile dev] [--wheel FILE] [--peers]
 #
-# --quick    only what .ci/run does: build, install, version, stubs, the quick tests
+# --quick    only the short part: build, install, version, stubs, the quick tests
 # --profile  the cargo profile of the wheel: dev (default; shares everything with .ci/run) or release
 # --wheel    takes this wheel and builds none
 # --peers    installs Open3D, small_gicp and kiss-matcher too, each into its own environment, and prints figures beside theirs
