@@ -26,7 +26,7 @@ pub fn answer(outcome: &Outcome, source: &str, target: &str, dropped: [usize; 2]
     answer
 }
 
-/// As [`answer`], as JSON.
+/// As `answer`, as JSON.
 pub fn to_json(outcome: &Outcome, source: &str, target: &str, dropped: [usize; 2]) -> Value {
     // Numbers, texts and lists of them always are JSON.
     serde_json::to_value(answer(outcome, source, target, dropped)).unwrap_or_default()
