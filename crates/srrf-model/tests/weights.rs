@@ -194,7 +194,7 @@ fn files_of_other_programs_are_named() {
         ("skeleton.pfi.heads", |c| c.skeleton.pfi.heads = 7),
         ("skeleton.sfe.layers", |c| c.skeleton.sfe.layers = 0),
         ("sem.levels", |c| c.sem.levels.clear()),
-        ("sem.levels[1].widths", |c| c.sem.levels[1].widths = vec![13, 0]),
+        ("sem.levels[1].widths[1]", |c| c.sem.levels[1].widths = vec![13, 0]),
         ("sem.skeleton_points", |c| c.sem.skeleton_points = 2),
         ("inference.passes", |c| c.inference.passes = 0),
         ("inference.prior", |c| c.inference.prior = Some(0.0)),
