@@ -43,6 +43,12 @@ impl Failure {
         Self { source: Some(Box::new(error)), ..self }
     }
 
+    /// The same failure, with the flag or the thing that it is about in front.
+    #[must_use]
+    pub fn at(self, what: &str) -> Self {
+        Self { message: format!("{what}: {}", self.message), ..self }
+    }
+
     /// A cloud, by its name, that cannot be used.
     pub fn cloud(name: &str, error: &CloudError) -> Self {
         Self::usage(format!("{name:?}: {error}{}", way_out(error))).because(error.clone())

@@ -5,10 +5,8 @@
 
 use std::time::Instant;
 
-use rand::rngs::ChaCha8Rng;
-use rand::{RngExt, SeedableRng};
-use srrf_classical::{Correspondences, GraphConsensus, RansacConsensus, SupportedPose};
-use srrf_cloud::{EulerXyz, Rigid};
+use srrf_classical::{GraphConsensus, RansacConsensus, SupportedPose, synthetic};
+use srrf_cloud::Rigid;
 
 /// Deviation of the noise; the points lie in a box of side 2.
 const NOISE: f64 = 0.01;
@@ -23,7 +21,7 @@ fn main() {
         for ratio in [0.01, 0.02, 0.05, 0.1, 0.2, 0.5] {
             let (mut graph, mut ransac, mut seconds, mut draws) = (0, 0, 0.0, 0);
             for seed in 0..TRIALS {
-                let (matches, truth) = matches(count, ratio, seed);
+                let (matches, truth) = synthetic(count, ratio, NOISE, seed).unwrap();
                 let search = GraphConsensus { distance: DISTANCE, ..GraphConsensus::default() };
                 let begun = Instant::now();
                 let found = search.poses(&matches);
@@ -64,22 +62,4 @@ fn is_right(found: &[SupportedPose], truth: &Rigid) -> bool {
         let pose = &best.target_from_source;
         pose.angle_to_deg(truth) < 2.0 && (pose.translation - truth.translation).norm() < 2.0 * DISTANCE
     })
-}
-
-/// `count` matches of which `ratio` are right but for noise.
-fn matches(count: usize, ratio: f64, seed: u64) -> (Correspondences, Rigid) {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let degrees: [f64; 3] = std::array::from_fn(|_| rng.random_range(-180.0..180.0));
-    let translation: [f64; 3] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
-    let truth = Rigid { rotation: EulerXyz::from_deg(degrees).to_matrix(), translation: translation.into() };
-    let right = (ratio * count as f64).round() as usize;
-    let (mut source, mut target) = (Vec::new(), Vec::new());
-    for i in 0..count {
-        let mut point = || -> [f64; 3] { std::array::from_fn(|_| rng.random_range(-1.0..1.0)) };
-        let (x, chance) = (point(), point());
-        let y = truth.apply(&if i < right { x } else { chance });
-        source.push(x);
-        target.push(y.map(|c| c + NOISE * (0..12).map(|_| rng.random::<f64>() - 0.5).sum::<f64>()));
-    }
-    (Correspondences::new(source, target).unwrap(), truth)
 }

@@ -115,13 +115,13 @@ fn fit_robustly(source: &[[f64; 3]], target: &[[f64; 3]], mut pose: Rigid, dista
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::consensus::synthetic;
+    use crate::synthetic;
 
     #[test]
     fn finds_few_right_matches_among_many() {
         for (ratio, count) in [(0.5, 200), (0.2, 400), (0.1, 600), (0.05, 1000), (0.02, 2000), (0.01, 2500)] {
             for seed in 0..3 {
-                let (matches, truth) = synthetic(count, ratio, 0.01, seed);
+                let (matches, truth) = synthetic(count, ratio, 0.01, seed).unwrap();
                 let search = GraphConsensus { distance: 0.03, ..GraphConsensus::default() };
                 let found = search.poses(&matches);
                 let best = &found[0].target_from_source;
@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn threads_do_not_matter_and_poses_differ() {
-        let (matches, _) = synthetic(700, 0.05, 0.01, 5);
+        let (matches, _) = synthetic(700, 0.05, 0.01, 5).unwrap();
         let search = GraphConsensus { distance: 0.03, keep: 6, ..GraphConsensus::default() };
         let pool = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
         let [one, three] = [1, 3].map(|n| pool(n).install(|| search.poses(&matches)));
@@ -154,8 +154,8 @@ mod tests {
 
     #[test]
     fn two_instances_are_both_found() {
-        let (one, first) = synthetic(300, 0.3, 0.005, 8);
-        let (other, second) = synthetic(300, 0.3, 0.005, 9);
+        let (one, first) = synthetic(300, 0.3, 0.005, 8).unwrap();
+        let (other, second) = synthetic(300, 0.3, 0.005, 9).unwrap();
         let both = |a: &[[f64; 3]], b: &[[f64; 3]]| [a, b].concat();
         let matches =
             Correspondences::new(both(one.source(), other.source()), both(one.target(), other.target()))
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn only_the_first_matches_count_where_there_are_too_many() {
-        let (matches, truth) = synthetic(500, 0.4, 0.01, 4);
+        let (matches, truth) = synthetic(500, 0.4, 0.01, 4).unwrap();
         let search = GraphConsensus { distance: 0.03, most: 250, ..GraphConsensus::default() };
         let found = search.poses(&matches);
         assert!(found[0].inliers <= 250 && found[0].target_from_source.angle_to_deg(&truth) < 2.0);

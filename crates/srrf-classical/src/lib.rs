@@ -26,6 +26,7 @@ mod icp_trimmed;
 mod identity;
 mod memo;
 mod ransac;
+mod synthetic;
 
 pub use consensus::{Correspondences, CorrespondencesError, SupportedPose};
 pub use correspond::nearest_descriptors;
@@ -39,3 +40,4 @@ pub use icp_robust::{IcpRobust, IcpRobustConfig};
 pub use icp_trimmed::{IcpTrimmed, IcpTrimmedConfig};
 pub use identity::Identity;
 pub use ransac::RansacConsensus;
+pub use synthetic::synthetic;

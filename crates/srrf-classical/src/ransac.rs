@@ -152,11 +152,11 @@ fn polish(pairs: &MatchedPoints, mut best: SupportedPose, distance: f64) -> Supp
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::consensus::synthetic;
+    use crate::synthetic;
 
     #[test]
     fn finds_one_in_five_and_stops_early() {
-        let (matches, truth) = synthetic(300, 0.2, 0.0, 1);
+        let (matches, truth) = synthetic(300, 0.2, 0.0, 1).unwrap();
         let search = RansacConsensus { distance: 0.05, seed: 3, ..RansacConsensus::default() };
         let (found, drawn) = search.poses(&matches);
         assert!(found[0].inliers >= 60 && found[0].target_from_source.angle_to_deg(&truth) < 1.0);

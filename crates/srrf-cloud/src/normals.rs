@@ -10,6 +10,9 @@ const SEQUENTIAL: usize = 4096;
 
 /// Eigenvalues closer than this, for a matrix whose largest entry is 1, are told apart by an iteration.
 const LEAST_GAP: f64 = 1e-5;
+/// Rows of `A - least I` whose longest cross product is shorter than this are too: a root is right to about 1e-8 only, and
+/// its error is divided by that length.
+const LEAST_ACROSS: f64 = 1e-2;
 
 /// A unit normal for each of `points` (shape `[n, 3]` in and out): the direction in which its `k`
 /// nearest points, itself among them, vary least.
@@ -82,7 +85,7 @@ fn closed_form(matrix: &Matrix3<f64>) -> Option<Vector3<f64>> {
     let rows = [0, 1, 2].map(|i| rest.row(i).transpose());
     let crosses = [rows[0].cross(&rows[1]), rows[1].cross(&rows[2]), rows[2].cross(&rows[0])];
     let longest = crosses.into_iter().max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))?;
-    longest.try_normalize(LEAST_GAP)
+    longest.try_normalize(LEAST_ACROSS)
 }
 
 #[cfg(test)]

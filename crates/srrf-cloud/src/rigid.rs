@@ -1,6 +1,6 @@
 //! [`Rigid`]: a rotation and a translation in `f64`.
 
-use nalgebra::{Matrix3, Matrix4, Vector3};
+use nalgebra::{Matrix3, Matrix4, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// A rigid motion `p -> R p + t`. Variables of this type carry the frames in their names:
@@ -22,6 +22,14 @@ impl Rigid {
     /// `R p + t`.
     pub fn apply(&self, point: &[f64; 3]) -> [f64; 3] {
         (self.rotation * Vector3::from(*point) + self.translation).into()
+    }
+
+    /// The rotation as a unit quaternion `[x, y, z, w]` with `w >= 0`.
+    pub fn quaternion_xyzw(&self) -> [f64; 4] {
+        let rotation = Rotation3::from_matrix_unchecked(self.rotation);
+        let q = UnitQuaternion::from_rotation_matrix(&rotation).into_inner();
+        let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+        [sign * q.i, sign * q.j, sign * q.k, sign * q.w]
     }
 
     /// The motion that undoes this one.

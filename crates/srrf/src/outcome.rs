@@ -1,6 +1,5 @@
 //! [`Outcome`]: everything that a user may ask of a registration.
 
-use nalgebra::{Rotation3, UnitQuaternion};
 use schemars::JsonSchema;
 use serde::Serialize;
 use srrf_cloud::Rigid;
@@ -90,9 +89,7 @@ pub struct Outcome {
 impl Outcome {
     /// The rotation as a unit quaternion `[w, x, y, z]` with `w >= 0`.
     pub fn quaternion_wxyz(&self) -> [f64; 4] {
-        let rotation = Rotation3::from_matrix_unchecked(self.target_from_source.rotation);
-        let q = UnitQuaternion::from_rotation_matrix(&rotation).into_inner();
-        let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
-        [sign * q.w, sign * q.i, sign * q.j, sign * q.k]
+        let [x, y, z, w] = self.target_from_source.quaternion_xyzw();
+        [w, x, y, z]
     }
 }

@@ -151,7 +151,7 @@ impl Places {
         check: impl FnOnce(&Path) -> Result<(), Failure>,
     ) -> Result<Self, Failure> {
         let Some(path) = path else { return Ok(self) };
-        check_output(path)?;
+        check_output(path).map_err(|failure| failure.at(flag))?;
         if !is_stream(path) && !is_special(path) {
             check(path)?;
         }

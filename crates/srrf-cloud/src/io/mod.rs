@@ -109,12 +109,6 @@ pub trait CloudFormat: Sync {
         Ok(Vec::new())
     }
 
-    /// Writes the points, without loss.
-    ///
-    /// # Errors
-    /// Those of `out`; [`FormatError::Unwritable`] inside where the format cannot hold the points.
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> std::io::Result<()>;
-
     /// Names of what the points have besides, and what is no [attribute](Self::attributes), such as words and lists.
     ///
     /// # Errors
@@ -158,17 +152,15 @@ pub trait CloudFormat: Sync {
     /// Writes a cloud in the precision that it asks for, with the attributes that the format [keeps](Self::keeps).
     ///
     /// # Errors
-    /// As [`write`](Self::write).
-    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> std::io::Result<()> {
-        self.write(cloud.points, out)
-    }
+    /// Those of `out`; [`FormatError::Unwritable`] inside where the format cannot hold the points.
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> std::io::Result<()>;
 
     /// Writes the file in `bytes` anew with its points moved by `motion` and its normals turned,
     /// and all else as it is; `options` say which numbers are the points, as for [`read`](Self::read). Points with NaN
     /// or infinite coordinates stay where they are.
     ///
     /// # Errors
-    /// Those of `out`; inside them a [`FormatError`], of `bytes` or as for [`write`](Self::write).
+    /// Those of `out`; inside them a [`FormatError`], of `bytes` or as for [`write_cloud`](Self::write_cloud).
     fn rewrite(
         &self,
         bytes: &[u8],
@@ -189,9 +181,9 @@ pub static FORMATS: &[&dyn CloudFormat] = &[
     &stl::Stl,
     &bin::Kitti,
     #[cfg(feature = "las")]
-    &las::Las,
+    &las::LAS,
     #[cfg(feature = "las")]
-    &las::Laz,
+    &las::LAZ,
     #[cfg(feature = "e57")]
     &e57::E57,
     #[cfg(feature = "gltf")]

@@ -84,10 +84,6 @@ impl CloudFormat for Npz {
         Ok(attributes)
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        self.write_cloud(&Outgoing::of_points(points), out)
-    }
-
     fn keeps(&self, _: &Attribute, _: &Outgoing<'_>) -> bool {
         true
     }
@@ -271,7 +267,7 @@ mod tests {
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         for (name, points) in arrays {
             let mut array = Vec::new();
-            Npy.write(points, &mut array).unwrap();
+            Npy.write_cloud(&Outgoing::of_points(points), &mut array).unwrap();
             put(&mut archive, name, method, &array).unwrap();
         }
         put(&mut archive, "note.txt", method, b"a").unwrap();

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::scan::{ByteLines, Line, Splice, moved, number, quote, turned, write_rows};
-use super::{CloudFormat, Contents, FormatError, Note, ReadOptions};
+use super::{CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// The words with which lines of an OBJ file begin.
@@ -134,8 +134,8 @@ impl CloudFormat for Obj {
         Ok(Contents { points, faces, notes, ..Contents::default() })
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        write_rows(points, "v ", out)
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        write_rows(cloud.points, "v ", out)
     }
 
     fn rewrite(

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::ops::Range;
 
 use super::scan::{ByteLines, Line, Splice, moved, number, turned, words, write_rows};
-use super::{CloudFormat, Contents, FormatError, ReadOptions};
+use super::{CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// A mesh: vertices `[n, 3]`, and triangles as indices of vertices.
@@ -39,9 +39,9 @@ impl CloudFormat for Off {
         Ok(Contents { points: vertices, faces: triangles, ..Contents::default() })
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "OFF\n{} 0 0", points.len())?;
-        write_rows(points, "", out)
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "OFF\n{} 0 0", cloud.points.len())?;
+        write_rows(cloud.points, "", out)
     }
 
     fn rewrite(

@@ -140,10 +140,6 @@ impl CloudFormat for Pts {
             .collect())
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        self.write_cloud(&Outgoing::of_points(points), out)
-    }
-
     fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
         Text.keeps(attribute, &Outgoing { extension: "pts", ..*cloud })
     }
@@ -222,7 +218,7 @@ mod tests {
     #[test]
     fn written_with_its_count_and_moved_alone() {
         let mut out = Vec::new();
-        Pts.write(&[[1.0, 0.5, -2.0], [3.0, 4.0, 5.0]], &mut out).unwrap();
+        Pts.write_cloud(&Outgoing::of_points(&[[1.0, 0.5, -2.0], [3.0, 4.0, 5.0]]), &mut out).unwrap();
         assert_eq!(out, b"2\n1 0.5 -2\n3 4 5\n");
         assert!(Pts.recognises(&out) && !Pts.recognises(b"1 2 3\n4 5 6\n") && !Pts.recognises(b"1\n"));
         assert_eq!(points_of(&Pts, &out).unwrap()[0], [1.0, 0.5, -2.0]);

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use super::scan::{ByteLines, Line, Splice, moved, number, quote, turned, words};
 use super::single::check_single;
-use super::{CloudFormat, Contents, FormatError, Note, ReadOptions};
+use super::{CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// Bytes before the triangles of a binary file, and of a triangle: a normal, three corners and two
@@ -61,7 +61,7 @@ impl CloudFormat for Stl {
         Ok(Contents { points: mesh.points, faces: mesh.faces, single: binary, notes, ..Contents::default() })
     }
 
-    fn write(&self, _points: &[[f64; 3]], _out: &mut dyn Write) -> io::Result<()> {
+    fn write_cloud(&self, _cloud: &Outgoing<'_>, _out: &mut dyn Write) -> io::Result<()> {
         let problem = "STL holds triangles, and a cloud has none; write .ply or .obj";
         Err(FormatError::Unwritable(problem.into()).into())
     }
@@ -301,6 +301,11 @@ mod tests {
         let error = |text: &str| points_of(&Stl, text.as_bytes()).unwrap_err().to_string();
         assert!(error("solid\nfacet normal 0 0 1\nvertex 0 0\n").contains("line 3: 2 numbers"));
         assert!(error("solid\nfacet normal 0 0 1\nvertex 0 0 0\nendfacet").contains("facet of 1 corners"));
-        assert!(Stl.write(&POINTS, &mut Vec::new()).unwrap_err().to_string().contains("write .ply"));
+        assert!(
+            Stl.write_cloud(&Outgoing::of_points(&POINTS), &mut Vec::new())
+                .unwrap_err()
+                .to_string()
+                .contains("write .ply")
+        );
     }
 }

@@ -89,11 +89,3 @@ pub(super) fn pose_of_quaternion(numbers: [f64; 7], order: QuaternionOrder) -> R
     let rotation = UnitQuaternion::new_normalize(quaternion).to_rotation_matrix().into_inner();
     Ok(Rigid { rotation, translation: Vector3::new(x, y, z) })
 }
-
-/// The rotation as `[x, y, z, w]` with `w >= 0`.
-pub(super) fn quaternion_xyzw(pose: &Rigid) -> [f64; 4] {
-    let rotation = nalgebra::Rotation3::from_matrix_unchecked(pose.rotation);
-    let q = UnitQuaternion::from_rotation_matrix(&rotation).into_inner();
-    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
-    [sign * q.i, sign * q.j, sign * q.k, sign * q.w]
-}

@@ -7,7 +7,6 @@ use std::str::FromStr;
 
 use serde_json::json;
 
-use super::matrix::quaternion_xyzw;
 use crate::Rigid;
 use crate::io::Array;
 
@@ -74,7 +73,7 @@ impl PoseFormat {
         let rows: [[f64; 4]; 4] =
             std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]));
         let [x, y, z] = target_from_source.translation.into();
-        let [qx, qy, qz, qw] = quaternion_xyzw(target_from_source);
+        let [qx, qy, qz, qw] = target_from_source.quaternion_xyzw();
         let mut text = String::new();
         // Writing to a string cannot fail.
         let _ = match self {

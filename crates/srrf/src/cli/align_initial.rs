@@ -199,7 +199,7 @@ mod tests {
     use serde_json::json;
     use srrf_cloud::EulerXyz;
 
-    use super::super::align_poses::{matrix, quaternion_xyzw};
+    use super::super::align_poses::matrix;
     use super::*;
 
     fn pose(s: f64) -> Rigid {
@@ -233,7 +233,7 @@ mod tests {
     #[test]
     fn tum_goes_by_number_or_by_order() {
         let row = |t: f64, p: &Rigid| {
-            let q = quaternion_xyzw(p);
+            let q = p.quaternion_xyzw();
             let v = p.translation;
             format!("{t} {:e} {:e} {:e} {:e} {:e} {:e} {:e}\n", v.x, v.y, v.z, q[0], q[1], q[2], q[3])
         };

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use nalgebra::{Matrix6, Rotation3, UnitQuaternion};
+use nalgebra::Matrix6;
 use serde_json::{Value, json};
 use srrf_align::{Map, MapEdge, PlacedScan};
 use srrf_args::Failure;
@@ -75,7 +75,7 @@ fn scan(number: usize, placed: &PlacedScan, scans: &ScanFiles) -> Value {
         "dropped_points": dropped,
         "component": placed.component,
         "map_from_scan": matrix(&placed.map_from_scan),
-        "quaternion_xyzw": quaternion_xyzw(&placed.map_from_scan),
+        "quaternion_xyzw": placed.map_from_scan.quaternion_xyzw(),
         "translation": placed.map_from_scan.translation.as_slice(),
         "probability": placed.probability,
         "abstain": placed.abstain,
@@ -112,20 +112,12 @@ fn rows(m: &Matrix6<f64>) -> Vec<Vec<f64>> {
     (0..6).map(|r| m.row(r).iter().copied().collect()).collect()
 }
 
-/// The rotation as a unit quaternion with w not negative.
-pub fn quaternion_xyzw(pose: &Rigid) -> [f64; 4] {
-    let q =
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(pose.rotation)).into_inner();
-    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
-    [sign * q.i, sign * q.j, sign * q.k, sign * q.w]
-}
-
 /// The largest map as TUM: the number of the scan stands for the time.
 pub fn to_tum(map: &Map, scans: &ScanFiles) -> String {
     let mut text = String::from("# number of the scan from 0, tx ty tz, qx qy qz qw of map_from_scan\n");
     for &i in &map.components[0] {
         let pose = &map.scans[i].map_from_scan;
-        let (t, q) = (&pose.translation, quaternion_xyzw(pose));
+        let (t, q) = (&pose.translation, pose.quaternion_xyzw());
         // Writing to a string cannot fail.
         let _ = writeln!(text, "# {}", scans.name(i));
         let _ =

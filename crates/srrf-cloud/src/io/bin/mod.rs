@@ -53,10 +53,6 @@ impl CloudFormat for Kitti {
         Ok(names.iter().enumerate().map(column).collect())
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        self.write_cloud(&Outgoing::of_points(points), out)
-    }
-
     fn keeps(&self, attribute: &Attribute, _: &Outgoing<'_>) -> bool {
         attribute.name == INTENSITY
     }
@@ -170,7 +166,7 @@ mod tests {
     #[test]
     fn large_coordinates_are_refused() {
         let utm = [[431_234.567_8, 4_812_345.678_9, 12.0], [431_254.567_8, 4_812_345.678_9, 12.0]];
-        let error = Kitti.write(&utm, &mut Vec::new()).unwrap_err().to_string();
+        let error = Kitti.write_cloud(&Outgoing::of_points(&utm), &mut Vec::new()).unwrap_err().to_string();
         assert!(error.contains("single precision") && error.contains(".ply"), "{error}");
     }
 }

@@ -9,7 +9,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use e57::{E57Reader, E57Writer, PointCloud, Record, RecordDataType, RecordName, RecordValue};
 use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::{CloudFormat, Contents, FormatError, Note, ReadOptions, ScanEntry};
+use super::{CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, ScanEntry};
 use crate::Rigid;
 
 /// E57 files. The points of all scans are read, or of one of them, each scan moved by its pose into the
@@ -51,8 +51,8 @@ impl CloudFormat for E57 {
         Ok(scans.iter().map(entry).collect())
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&guarded(|| file(points))?)
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&guarded(|| file(cloud.points))?)
     }
 
     fn rewrite(

@@ -8,7 +8,7 @@ const POINTS: [[f64; 3]; 3] =
 
 fn written(points: &[[f64; 3]]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    E57.write(points, &mut bytes).unwrap();
+    E57.write_cloud(&Outgoing::of_points(points), &mut bytes).unwrap();
     bytes
 }
 

@@ -15,7 +15,7 @@ use base64::engine::general_purpose::STANDARD;
 use gltf::binary::{Glb, Header};
 
 use super::single::check_single;
-use super::{Attribute, AttributeValues, CloudFormat, Contents, FormatError, Note, ReadOptions};
+use super::{Attribute, AttributeValues, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// glTF files. The points of all meshes of the scene are read, each placed by its nodes; triangles,
@@ -86,7 +86,8 @@ impl CloudFormat for Gltf {
         Ok(attributes)
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        let points = cloud.points;
         check_single(points, "glTF")?;
         if points.is_empty() || !points.iter().flatten().all(|c| c.is_finite()) {
             let problem = "glTF holds neither empty clouds nor NaN; write .ply";

@@ -226,17 +226,20 @@ fn what_is_refused_is_named() {
 fn written_files_and_moved_copies() {
     let points = [[0.5, -2.0, 3.25], [0.1f32.into(), 1e-3f32.into(), 7.0], [4.0, 5.0, 6.0]];
     let mut bytes = Vec::new();
-    GLB.write(&points, &mut bytes).unwrap();
+    GLB.write_cloud(&Outgoing::of_points(&points), &mut bytes).unwrap();
     assert_eq!(bytes.len() % 4, 0);
     let mut text = Vec::new();
-    GLTF.write(&points, &mut text).unwrap();
+    GLTF.write_cloud(&Outgoing::of_points(&points), &mut text).unwrap();
     assert!(GLB.recognises(&bytes) && GLTF.recognises(&text));
     for bytes in [&bytes, &text] {
         let read = contents(bytes).unwrap();
         assert_eq!((read.points.as_slice(), read.single), (&points[..], true));
     }
     let error = GLB
-        .write(&[[4_812_345.678, 0.0, 0.0], [4_812_346.0, 0.5, 1.0]], &mut Vec::new())
+        .write_cloud(
+            &Outgoing::of_points(&[[4_812_345.678, 0.0, 0.0], [4_812_346.0, 0.5, 1.0]]),
+            &mut Vec::new(),
+        )
         .unwrap_err()
         .to_string();
     assert!(error.contains("single precision"), "{error}");

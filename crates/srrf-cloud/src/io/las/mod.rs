@@ -16,28 +16,33 @@ use super::scan::moved;
 use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
 use crate::Rigid;
 
+/// LAS and LAZ files.
+pub(super) struct LasFormat {
+    zipped: bool,
+}
+
 /// LAS files, versions 1.0 to 1.4. Coordinates are 32-bit integers times a scale plus an offset;
 /// they are read exactly so, and written with a step of at most a billionth of the cloud's size (a
 /// micrometre on a kilometre), to which points are rounded. A moved copy keeps all attributes,
 /// records and the coordinate system as they are; its step is up to 100 times finer than the
 /// original's.
-pub(super) struct Las;
+pub(super) const LAS: LasFormat = LasFormat { zipped: false };
 
 /// LAZ files, which are LAS compressed. Where a file is compressed but for its name, or the other
 /// way round, it is read (and copied) as what it is.
-pub(super) struct Laz;
+pub(super) const LAZ: LasFormat = LasFormat { zipped: true };
 
-impl CloudFormat for Las {
+impl CloudFormat for LasFormat {
     fn name(&self) -> &'static str {
-        "las"
+        if self.zipped { "laz" } else { "las" }
     }
 
     fn extensions(&self) -> &[&'static str] {
-        &["las"]
+        if self.zipped { &["laz"] } else { &["las"] }
     }
 
     fn recognises(&self, bytes: &[u8]) -> bool {
-        bytes.starts_with(b"LASF") && bytes.get(104).is_none_or(|format| format & 0x80 == 0)
+        bytes.starts_with(b"LASF") && (self.zipped || bytes.get(104).is_none_or(|format| format & 0x80 == 0))
     }
 
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
@@ -48,16 +53,12 @@ impl CloudFormat for Las {
         read_attributes(bytes, options)
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        self.write_cloud(&Outgoing::of_points(points), out)
-    }
-
     fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
         attributes::keeps(attribute, cloud)
     }
 
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&file(cloud, false)?)
+        out.write_all(&file(cloud, self.zipped)?)
     }
 
     fn rewrite_from(
@@ -67,63 +68,9 @@ impl CloudFormat for Las {
         options: &ReadOptions,
         motion: &Rigid,
     ) -> Option<io::Result<Vec<u8>>> {
-        let repack = |moved: Vec<u8>| convert::repacked(&moved, options, false);
-        (format == "laz").then(|| rewritten(bytes, options, motion).and_then(repack))
-    }
-
-    fn rewrite(
-        &self,
-        bytes: &[u8],
-        options: &ReadOptions,
-        motion: &Rigid,
-        out: &mut dyn Write,
-    ) -> io::Result<()> {
-        out.write_all(&rewritten(bytes, options, motion)?)
-    }
-}
-
-impl CloudFormat for Laz {
-    fn name(&self) -> &'static str {
-        "laz"
-    }
-
-    fn extensions(&self) -> &[&'static str] {
-        &["laz"]
-    }
-
-    fn recognises(&self, bytes: &[u8]) -> bool {
-        bytes.starts_with(b"LASF")
-    }
-
-    fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
-        read(bytes, options)
-    }
-
-    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
-        read_attributes(bytes, options)
-    }
-
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        self.write_cloud(&Outgoing::of_points(points), out)
-    }
-
-    fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
-        attributes::keeps(attribute, cloud)
-    }
-
-    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&file(cloud, true)?)
-    }
-
-    fn rewrite_from(
-        &self,
-        format: &str,
-        bytes: &[u8],
-        options: &ReadOptions,
-        motion: &Rigid,
-    ) -> Option<io::Result<Vec<u8>>> {
-        let repack = |moved: Vec<u8>| convert::repacked(&moved, options, true);
-        (format == "las").then(|| rewritten(bytes, options, motion).and_then(repack))
+        let twin = if self.zipped { "las" } else { "laz" };
+        let repack = |moved: Vec<u8>| convert::repacked(&moved, options, self.zipped);
+        (format == twin).then(|| rewritten(bytes, options, motion).and_then(repack))
     }
 
     fn rewrite(

@@ -119,7 +119,7 @@ fn copc_moves() {
     let bytes = file(6, 0, Chunks::Variable, &points);
     let motion = Rigid { translation: [10.0, 20.0, -0.5].into(), ..Rigid::identity() };
     let mut copy = Vec::new();
-    Laz.rewrite(&bytes, &ReadOptions::default(), &motion, &mut copy).unwrap();
+    LAZ.rewrite(&bytes, &ReadOptions::default(), &motion, &mut copy).unwrap();
     let moved = super::read(&copy, &ReadOptions::default()).unwrap().points;
     for (old, new) in points.iter().zip(moved) {
         let expected = [old[0] + 10.0, old[1] + 20.0, old[2] - 0.5];

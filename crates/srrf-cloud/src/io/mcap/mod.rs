@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use self::cloud::Message;
 use self::messages::{Topic, each_cloud};
 use super::scan::quote;
-use super::{Attribute, CloudFormat, Contents, FormatError, ReadOptions, ScanEntry};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ScanEntry};
 use crate::Rigid;
 
 /// MCAP files of ROS 2 (CDR) and ROS 1. The cloud is one message of one topic; where there are
@@ -152,7 +152,7 @@ impl CloudFormat for Mcap {
         with_message(bytes, options, |message| Ok(message.attributes()))
     }
 
-    fn write(&self, _points: &[[f64; 3]], _out: &mut dyn Write) -> io::Result<()> {
+    fn write_cloud(&self, _cloud: &Outgoing<'_>, _out: &mut dyn Write) -> io::Result<()> {
         Err(not_written())
     }
 

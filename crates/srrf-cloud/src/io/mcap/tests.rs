@@ -236,6 +236,6 @@ fn what_is_not_supported_or_damaged() {
         assert!(read(&bytes[..length], &default()).is_err(), "{length}");
     }
     let mut out = Vec::new();
-    let refused = Mcap.write(&[[0.0; 3]], &mut out).unwrap_err().to_string();
+    let refused = Mcap.write_cloud(&Outgoing::of_points(&[[0.0; 3]]), &mut out).unwrap_err().to_string();
     assert!(refused.contains(".pcd"));
 }

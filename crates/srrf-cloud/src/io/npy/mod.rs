@@ -69,10 +69,6 @@ impl CloudFormat for Npy {
         Ok(NpyTable::parse(bytes, options)?.attributes())
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        self.write_cloud(&Outgoing::of_points(points), out)
-    }
-
     fn has_both_precisions(&self) -> bool {
         true
     }

@@ -55,7 +55,7 @@ fn fields_and_big_endian_numbers() {
 #[test]
 fn a_header_like_that_of_numpy() {
     let mut ours = Vec::new();
-    Npy.write(&[[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]], &mut ours).unwrap();
+    Npy.write_cloud(&Outgoing::of_points(&[[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]), &mut ours).unwrap();
     let read = npyz::NpyFile::new(&ours[..]).unwrap();
     assert_eq!((read.shape(), (ours.len() - 48) % 64), (&[2, 3][..], 0));
     assert_eq!(read.into_vec::<f64>().unwrap(), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);

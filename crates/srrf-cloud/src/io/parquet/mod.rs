@@ -12,7 +12,7 @@ use arrow_schema::DataType;
 use self::columns::Place;
 use self::table::Table;
 use super::scalar::Scalar;
-use super::{Attribute, CloudFormat, Contents, FormatError, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// Parquet files. The points are the columns x, y and z of any type of numbers, or a column of lists
@@ -88,8 +88,8 @@ impl CloudFormat for Parquet {
         Ok(attributes)
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&write::file(points)?)
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        out.write_all(&write::file(cloud.points)?)
     }
 
     fn rewrite(

@@ -124,7 +124,7 @@ fn columns_are_asked_for_by_name() {
 fn what_is_written_reads_back_and_moves() {
     let many: Vec<[f64; 3]> = (0..70_001).map(|i| [f64::from(i), 0.1, -f64::from(i) / 3.0]).collect();
     let mut bytes = Vec::new();
-    Parquet.write(&many, &mut bytes).unwrap();
+    Parquet.write_cloud(&Outgoing::of_points(&many), &mut bytes).unwrap();
     let read = Parquet.read(&bytes, &ReadOptions::default()).unwrap();
     assert_eq!((read.points, read.single), (many, false));
 
@@ -163,7 +163,7 @@ fn what_is_written_reads_back_and_moves() {
 fn damage_is_found() {
     let mut bytes = Vec::new();
     let many: Vec<[f64; 3]> = (0..100).map(|i| [f64::from(i), 0.1, -f64::from(i)]).collect();
-    Parquet.write(&many, &mut bytes).unwrap();
+    Parquet.write_cloud(&Outgoing::of_points(&many), &mut bytes).unwrap();
     for length in 0..bytes.len() {
         assert!(points(&bytes[..length]).is_err(), "{length}");
     }

@@ -42,10 +42,6 @@ impl CloudFormat for Ply {
         attributes::left_out(bytes)
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        self.write_cloud(&Outgoing::of_points(points), out)
-    }
-
     fn keeps(&self, attribute: &Attribute, _: &Outgoing<'_>) -> bool {
         attributes::keeps(attribute)
     }

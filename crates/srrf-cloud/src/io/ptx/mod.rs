@@ -7,7 +7,9 @@ use std::io::{self, Write};
 
 use self::parse::{PtxHeader, PtxRow, parse};
 use super::scan::{Splice, put_number};
-use super::{Attribute, AttributeValues, CloudFormat, Contents, FormatError, Note, ReadOptions, ScanEntry};
+use super::{
+    Attribute, AttributeValues, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, ScanEntry,
+};
 use crate::Rigid;
 
 /// PTX files. The points of all scans are read, each scan moved by its pose into the coordinates of
@@ -93,7 +95,7 @@ impl CloudFormat for Ptx {
         Ok(attributes)
     }
 
-    fn write(&self, _points: &[[f64; 3]], _out: &mut dyn Write) -> io::Result<()> {
+    fn write_cloud(&self, _cloud: &Outgoing<'_>, _out: &mut dyn Write) -> io::Result<()> {
         let problem = "PTX holds the grid of a scanner, which other clouds do not have; write .ply or .e57";
         Err(FormatError::Unwritable(problem.into()).into())
     }

@@ -86,10 +86,6 @@ impl CloudFormat for Text {
         Ok(other_columns(bytes, options)?.words())
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        self.write_cloud(&Outgoing::of_points(points), out)
-    }
-
     fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
         attributes::keeps(attribute, cloud)
     }

@@ -13,7 +13,7 @@ use std::io::{self, Write};
 use self::legacy::PointData;
 use self::xml::{What, XmlKind};
 use super::scans::attribute_values;
-use super::{Attribute, CloudFormat, Contents, FormatError, Note, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// Legacy files of VTK, text and binary: POLYDATA, UNSTRUCTURED_GRID and STRUCTURED_GRID. Polygons,
@@ -102,8 +102,8 @@ impl CloudFormat for Vtk {
         Ok(attributes(legacy::read(bytes, options)?.data))
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        write::legacy(points, out)
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        write::legacy(cloud.points, out)
     }
 
     fn rewrite(
@@ -154,8 +154,8 @@ impl CloudFormat for VtkXml {
         Ok(attributes(xml::read(bytes, options, What::Data)?.data))
     }
 
-    fn write(&self, points: &[[f64; 3]], out: &mut dyn Write) -> io::Result<()> {
-        write::xml(self.kind, points, out)
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        write::xml(self.kind, cloud.points, out)
     }
 
     fn rewrite(

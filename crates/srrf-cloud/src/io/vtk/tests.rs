@@ -288,12 +288,12 @@ fn what_is_written_reads_back() {
     let points = [[431_234.567, -0.0, 5e-324], [0.1, 0.2, -1e300]];
     for format in [&Vtk as &dyn CloudFormat, &VTP, &VTU] {
         let mut bytes = Vec::new();
-        format.write(&points, &mut bytes).unwrap();
+        format.write_cloud(&Outgoing::of_points(&points), &mut bytes).unwrap();
         assert!(format.recognises(&bytes));
         let read = contents(format, &bytes).unwrap();
         assert_eq!((read.points.as_slice(), read.single, read.faces), (&points[..], false, vec![]));
     }
-    let refused = VTS.write(&points, &mut Vec::new()).unwrap_err().to_string();
+    let refused = VTS.write_cloud(&Outgoing::of_points(&points), &mut Vec::new()).unwrap_err().to_string();
     assert!(refused.contains("write .vtp"), "{refused}");
 }
 
