@@ -161,22 +161,26 @@ impl Sheet {
             html += &format!("<p>{}</p>", escape(&self.note));
         }
         html += "<div class=\"scroll\"><table><thead><tr>";
-        for (column, head) in self.head.iter().enumerate() {
-            let class = if self.is_numeric(column) { " class=\"number\"" } else { "" };
+        let classes: Vec<&str> = (0..self.head.len())
+            .map(|column| if self.is_numeric(column) { " class=\"number\"" } else { "" })
+            .collect();
+        for (head, class) in self.head.iter().zip(&classes) {
             html +=
                 &format!("<th scope=\"col\"{class}><button type=\"button\">{}</button></th>", escape(head));
         }
         html += "</tr></thead><tbody>\n";
         for row in &self.rows {
             html += "<tr>";
-            for cell in row {
+            for (cell, class) in row.iter().zip(&classes) {
                 let printed = escape(&cell.printed());
                 // Writing to a String cannot fail.
                 let _ = match cell {
-                    Cell::Text(_) => write!(html, "<td>{printed}</td>"),
-                    Cell::Number(value, _) => write!(html, "<td data-v=\"{value}\">{printed}</td>"),
-                    Cell::Best(value, _) => write!(html, "<td data-v=\"{value}\"><b>{printed}</b></td>"),
-                    Cell::None => write!(html, "<td data-v=\"\">{printed}</td>"),
+                    Cell::Text(_) => write!(html, "<td{class}>{printed}</td>"),
+                    Cell::Number(value, _) => write!(html, "<td{class} data-v=\"{value}\">{printed}</td>"),
+                    Cell::Best(value, _) => {
+                        write!(html, "<td{class} data-v=\"{value}\"><b>{printed}</b></td>")
+                    }
+                    Cell::None => write!(html, "<td{class} data-v=\"\">{printed}</td>"),
                 };
             }
             html += "</tr>\n";

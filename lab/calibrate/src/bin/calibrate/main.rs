@@ -91,7 +91,7 @@ fn main() {
     let page = report::tables(&held_out, says);
     println!("the new fit, held out:\n{page}");
     if arguments.write {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/srrf/src/calibration.json");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../crates/srrf/src/calibration.json");
         fs::write(&path, serde_json::to_string_pretty(&model).unwrap() + "\n").unwrap();
     }
     if let Some(book) = &arguments.book {
