@@ -48,7 +48,8 @@ fn write(path: &Path, single: bool) -> Kept {
 
 /// Three points are too few for a `.bin` to say what they are.
 fn open(path: &Path) -> CloudFile {
-    let options = ReadOptions { layout: Some(PointLayout::KITTI), ..ReadOptions::default() };
+    let bin = path.extension().is_some_and(|extension| extension == "bin");
+    let options = ReadOptions { layout: bin.then_some(PointLayout::KITTI), ..ReadOptions::default() };
     CloudFile::open_with(path, options).unwrap()
 }
 
@@ -66,17 +67,22 @@ fn attributes_travel_between_formats() {
     let colours: &[&str] = &all[..3];
     let kept_by = |extension: &str| -> Vec<&str> {
         match extension {
-            "npy" => Vec::new(),
             "bin" => vec!["intensity"],
+            "obj" => colours.to_vec(),
+            "off" => all[..6].to_vec(),
+            "e57" => all[..7].to_vec(),
             "pts" | "las" | "laz" => [colours, &["intensity"]].concat(),
             _ => all.to_vec(),
         }
     };
-    let extensions: Vec<&str> = ["ply", "pcd", "csv", "xyz", "npz", "npy", "pts", "bin"]
+    let extensions: Vec<&str> = ["ply", "pcd", "csv", "xyz", "npz", "npy", "pts", "bin", "obj", "off"]
         .into_iter()
         .chain(if cfg!(feature = "las") { vec!["las", "laz"] } else { Vec::new() })
+        .chain(cfg!(feature = "e57").then_some("e57"))
+        .chain(cfg!(feature = "parquet").then_some("parquet"))
         .collect();
-    for from in ["ply", "pcd", "csv", "xyz", "npz"] {
+    let sources = ["ply", "pcd", "csv", "xyz", "npz", "npy"];
+    for from in sources.into_iter().chain(cfg!(feature = "parquet").then_some("parquet")) {
         let source = folder.path().join(format!("source.{from}"));
         assert!(write(&source, true).lost.is_empty(), "{from}");
         for to in &extensions {
@@ -96,7 +102,7 @@ fn attributes_travel_between_formats() {
                 let before = |i: usize| attribute.values.get(i).unwrap();
                 let mut expected: Vec<f64> = (0..3).map(before).collect();
                 // x becomes y, and y becomes -x; but a copy in the same text or archive turns no columns.
-                let turns = from != *to || ["ply", "pcd"].contains(to);
+                let turns = from != *to || ["ply", "pcd", "parquet"].contains(to);
                 match name {
                     "nx" if turns => expected = vec![0.0, -1.0, 0.0],
                     "ny" if turns => expected = vec![1.0, 0.0, 0.0],
@@ -130,7 +136,7 @@ fn single_precision_stays() {
     for (from, to, motion, why, words) in [
         ("single.ply", "a.ply", motion(), None, "property float x"),
         ("single.ply", "a.pcd", motion(), None, "SIZE 4 4 4 4 4 4 4 4 4\nTYPE F F F F F F F F I"),
-        ("single.ply", "a.npy", motion(), None, "'<f4'"),
+        ("single.ply", "a.npy", motion(), None, "[('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('red', '<u1')"),
         ("double.ply", "b.ply", motion(), None, "property double x"),
         ("double.ply", "b.pcd", motion(), Some(WhyDouble::AsOriginal), "SIZE 8 8 8"),
     ] {

@@ -263,3 +263,48 @@ fn files_that_are_something_else_are_called_by_their_names() {
         refused(name, bytes, &[facts]);
     }
 }
+
+/// A switch that says nothing to a format is not passed over.
+#[test]
+fn switches_that_say_nothing_are_refused() {
+    let off = "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n";
+    let xyz = "0 0 0\n1 0 0\n0 1 0\n";
+    let d = ReadOptions::default;
+    for (name, text, options, facts) in [
+        ("a.off", off, columns("1,2,3"), ["`--columns`", "format off", "none of the switches"]),
+        (
+            "a.off",
+            off,
+            ReadOptions { layout: "kitti".parse().ok(), ..d() },
+            ["`--layout`", "`--source-layout`", "off"],
+        ),
+        (
+            "a.off",
+            off,
+            ReadOptions { topic: Some("t".into()), ..d() },
+            ["`--topic`", "`--target-topic`", "off"],
+        ),
+        (
+            "a.xyz",
+            xyz,
+            ReadOptions { array: Some("a".into()), ..d() },
+            ["`--array`", "xyz", "takes --columns;"],
+        ),
+        ("a.xyz", xyz, ReadOptions { message: Some(1), ..d() }, ["`--message`", "xyz", "leave it out"]),
+        (
+            "a.pts",
+            xyz,
+            ReadOptions { array: Some("a".into()), ..d() },
+            ["`--array`", "pts", "takes --columns, --scan;"],
+        ),
+        ("a.off", off, ReadOptions { scan: Some(2), ..d() }, ["scan 2", "off", "holds one"]),
+    ] {
+        let error = read_as(name, text.as_bytes(), options).unwrap_err().to_string();
+        facts.iter().for_each(|fact| assert!(error.contains(fact), "{fact:?} in {error}"));
+    }
+    assert_eq!(read_as("a.xyz", xyz.as_bytes(), columns("3,2,1")).unwrap().points[1], [0.0, 0.0, 1.0]);
+    assert_eq!(
+        read_as("a.off", off.as_bytes(), ReadOptions { scan: Some(1), ..d() }).unwrap().points.len(),
+        3
+    );
+}

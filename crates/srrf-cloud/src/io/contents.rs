@@ -109,6 +109,11 @@ pub enum Note {
     },
     /// The first line is a title of numbers: 0, 1, 2 and so on, as pandas writes it for columns without names.
     NumberedTitle,
+    /// Rows lack a coordinate; they are points with NaN.
+    EmptyCells {
+        /// How many.
+        rows: usize,
+    },
     /// Several scans were read as one cloud, each where its pose says.
     Merged {
         /// How many.
@@ -147,6 +152,12 @@ impl fmt::Display for Note {
             Self::NumberedTitle => {
                 f.write_str("the first line, 0, 1, 2 and so on, was taken for a title and not for a point")
             }
+            Self::EmptyCells { rows } => write!(
+                f,
+                "{rows} row{} a coordinate (an empty cell, or a word such as NA) and {} as NaN",
+                if *rows == 1 { " lacks" } else { "s lack" },
+                if *rows == 1 { "counts" } else { "count" }
+            ),
             Self::Merged { scans } => {
                 write!(
                     f,

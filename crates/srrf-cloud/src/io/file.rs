@@ -145,7 +145,8 @@ impl CloudFile {
     /// # Errors
     /// As [`contents`](Self::contents).
     pub fn scans(&self) -> Result<Vec<ScanEntry>, IoError> {
-        self.format.scans(&self.bytes, &self.options).map_err(|source| self.error(source))
+        let scans = self.check_options().and_then(|()| self.format.scans(&self.bytes, &self.options));
+        scans.map_err(|source| self.error(source))
     }
 
     /// What the points have besides their place.
@@ -157,12 +158,32 @@ impl CloudFile {
     }
 
     fn read(&self) -> Result<Contents, FormatError> {
+        self.check_options()?;
+        self.format.read(&self.bytes, &self.options)
+    }
+
+    /// Refuses options that say nothing to the format: whoever set them expects something of them.
+    fn check_options(&self) -> Result<(), FormatError> {
+        let (name, takes) = (self.format.name(), self.format.takes());
+        if let Some(switch) = self.options.switches().find(|switch| !takes.contains(switch)) {
+            let flag = switch.flag();
+            let mut taken: Vec<&str> = takes.iter().map(|switch| switch.flag()).collect();
+            taken.extend(self.format.holds_scans().then_some("--scan"));
+            let taken = match taken.is_empty() {
+                true => "none of the switches of reading".to_owned(),
+                false => taken.join(", "),
+            };
+            return Err(FormatError::Content(format!(
+                "`{flag}` says nothing to a file of the format {name}, which takes {taken}; leave it out, or give it to \
+                 the other cloud alone, as `--source-{bare}` and `--target-{bare}` do",
+                bare = flag.trim_start_matches('-')
+            )));
+        }
         match self.options.scan {
             Some(number) if number != 1 && !self.format.holds_scans() => Err(FormatError::Content(format!(
-                "scan {number} is asked for, and a file of the format {} holds one; leave the number out",
-                self.format.name()
+                "scan {number} is asked for, and a file of the format {name} holds one; leave the number out"
             ))),
-            _ => self.format.read(&self.bytes, &self.options),
+            _ => Ok(()),
         }
     }
 
@@ -234,6 +255,7 @@ impl CloudFile {
         motion: &Rigid,
         out: &mut dyn Write,
     ) -> io::Result<Kept> {
+        self.check_options()?;
         if format.name() == self.format.name() && format.conforms(&self.bytes, extension) {
             return self.rewrite(extension, motion, out);
         }

@@ -63,7 +63,7 @@ pub use error::{FormatError, IoError};
 pub use file::{CloudFile, format_names};
 pub use npy::Array;
 pub use npz_writer::NpzWriter;
-pub use options::{ColumnName, OptionError, PointColumns, PointLayout, ReadOptions};
+pub use options::{ColumnName, OptionError, PointColumns, PointLayout, ReadOptions, ReadSwitch};
 pub use outgoing::{Kept, Outgoing, WhyDouble};
 pub use text::parse_point;
 
@@ -89,6 +89,11 @@ pub trait CloudFormat: Sync {
     /// Whether a file may hold several scans. The formats for which it may obey [`ReadOptions::scan`].
     fn holds_scans(&self) -> bool {
         false
+    }
+
+    /// The options that say something to this format, beside the number of a [scan](Self::holds_scans). Others are refused.
+    fn takes(&self) -> &'static [ReadSwitch] {
+        &[]
     }
 
     /// The scans of a file, in its order; one where the format knows no more.

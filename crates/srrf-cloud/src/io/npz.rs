@@ -8,7 +8,7 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 use super::npy::{Npy, array_of, columns, could_be_cloud, known};
 use super::outgoing::{COLOURS, INTENSITY, NORMALS};
-use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ReadSwitch};
 use crate::Rigid;
 
 /// Names of the array that is the cloud.
@@ -58,6 +58,10 @@ impl CloudFormat for Npz {
         bytes.starts_with(b"PK\x03\x04")
     }
 
+    fn takes(&self) -> &'static [ReadSwitch] {
+        &[ReadSwitch::Columns, ReadSwitch::Array]
+    }
+
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
         let mut archive = open(bytes)?;
         let cloud = choose(&mut archive, options)?;
@@ -94,7 +98,7 @@ impl CloudFormat for Npz {
 
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
         let mut array = Vec::new();
-        Npy.write_cloud(cloud, &mut array)?;
+        Npy.write_cloud(&Outgoing { attributes: &[], ..*cloud }, &mut array)?;
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         put(&mut archive, "points.npy", CompressionMethod::Stored, &array)?;
         let mut together: Vec<&str> = Vec::new();

@@ -82,6 +82,48 @@ impl ReadOptions {
     }
 }
 
+/// An option that speaks of some formats alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReadSwitch {
+    /// [`ReadOptions::columns`]
+    Columns,
+    /// [`ReadOptions::array`]
+    Array,
+    /// [`ReadOptions::layout`]
+    Layout,
+    /// [`ReadOptions::topic`]
+    Topic,
+    /// [`ReadOptions::message`]
+    Message,
+}
+
+impl ReadSwitch {
+    /// The flag of the programs.
+    pub fn flag(self) -> &'static str {
+        match self {
+            Self::Columns => "--columns",
+            Self::Array => "--array",
+            Self::Layout => "--layout",
+            Self::Topic => "--topic",
+            Self::Message => "--message",
+        }
+    }
+}
+
+impl ReadOptions {
+    /// The options that are set and speak of some formats alone.
+    pub fn switches(&self) -> impl Iterator<Item = ReadSwitch> {
+        let set = [
+            self.columns.is_some().then_some(ReadSwitch::Columns),
+            self.array.is_some().then_some(ReadSwitch::Array),
+            self.layout.is_some().then_some(ReadSwitch::Layout),
+            self.topic.is_some().then_some(ReadSwitch::Topic),
+            self.message.is_some().then_some(ReadSwitch::Message),
+        ];
+        set.into_iter().flatten()
+    }
+}
+
 /// A column by its name or by its number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ColumnName {

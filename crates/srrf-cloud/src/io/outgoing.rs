@@ -48,14 +48,7 @@ impl<'a> Outgoing<'a> {
     /// The colours in 8 bits a part, and whether they were rounded to it: whole numbers up to 255 are taken as they are,
     /// larger ones as 16 bits, fractions as shares of 1.
     pub(super) fn colours(&self) -> Option<(Vec<[u8; 3]>, bool)> {
-        let parts = self.triple(COLOURS)?;
-        let most = parts.iter().map(|part| part.most()).fold(0.0, f64::max);
-        let shares = parts.iter().all(|part| part.is_fraction()) && most <= 1.0;
-        let scale = match () {
-            () if shares => 255.0,
-            () if most <= 255.0 => 1.0,
-            () => 255.0 / 65535.0,
-        };
+        let (parts, scale) = self.scaled_colours()?;
         let mut rounded = false;
         let colours = (0..self.points.len())
             .map(|point| {
@@ -68,10 +61,32 @@ impl<'a> Outgoing<'a> {
             .collect();
         Some((colours, rounded))
     }
+
+    /// The colours as shares of 1.
+    pub(super) fn shares(&self) -> Option<Vec<[f32; 3]>> {
+        let (parts, scale) = self.scaled_colours()?;
+        let share = |value: f64| (value * scale / 255.0) as f32;
+        let colour = |point| parts.map(|part| share(part.values.get(point).unwrap_or(0.0)));
+        Some((0..self.points.len()).map(colour).collect())
+    }
+
+    /// The parts of the colours, and by what they are multiplied to be shares of 255.
+    fn scaled_colours(&self) -> Option<([&'a Attribute; 3], f64)> {
+        let parts = self.triple(COLOURS)?;
+        let most = parts.iter().map(|part| part.most()).fold(0.0, f64::max);
+        let shares = parts.iter().all(|part| part.is_fraction()) && most <= 1.0;
+        let scale = match () {
+            () if shares => 255.0,
+            () if most <= 255.0 => 1.0,
+            () => 255.0 / 65535.0,
+        };
+        Some((parts, scale))
+    }
 }
 
 impl Attribute {
-    fn most(&self) -> f64 {
+    /// The largest value, 0 at least.
+    pub(super) fn most(&self) -> f64 {
         (0..self.values.len()).filter_map(|i| self.values.get(i)).fold(0.0, f64::max)
     }
 

@@ -7,7 +7,7 @@ use super::scalar::Scalar;
 use super::scan::{ByteLines, number};
 use super::scans::{attribute_values, no_such_scan};
 use super::text::Text;
-use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ScanEntry};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ReadSwitch, ScanEntry};
 use crate::Rigid;
 
 /// PTS files; the lines are read as text is. A file of several scans has no poses for them, so that
@@ -91,6 +91,10 @@ impl CloudFormat for Pts {
             (0..3).all(|_| words.next().is_some_and(|(_, word)| number(word).is_ok()))
         };
         counts && lines.next().is_some_and(|line| numbers(line.text))
+    }
+
+    fn takes(&self) -> &'static [ReadSwitch] {
+        &[ReadSwitch::Columns]
     }
 
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {

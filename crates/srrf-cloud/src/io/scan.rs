@@ -140,22 +140,14 @@ pub(super) fn put_single(out: &mut Vec<u8>, value: f32) {
     };
 }
 
-/// Writes `points`, each as `head` and three numbers on a line of its own.
-pub(super) fn write_rows(points: &[[f64; 3]], head: &str, out: &mut dyn Write) -> io::Result<()> {
-    let mut row = Vec::with_capacity(96);
-    for point in points {
-        row.clear();
-        row.extend_from_slice(head.as_bytes());
-        for (axis, &value) in point.iter().enumerate() {
-            if axis > 0 {
-                row.push(b' ');
-            }
-            put_number(&mut row, value);
+/// Writes three numbers with blanks between them.
+pub(super) fn put_point(out: &mut Vec<u8>, point: &[f64; 3]) {
+    for (axis, &value) in point.iter().enumerate() {
+        if axis > 0 {
+            out.push(b' ');
         }
-        row.push(b'\n');
-        out.write_all(&row)?;
+        put_number(out, value);
     }
-    Ok(())
 }
 
 /// `R p + t`; a point with a NaN or infinite coordinate stays as it is.
@@ -175,11 +167,13 @@ pub(super) struct Splice<'a, 'w> {
     out: &'w mut dyn Write,
     /// Numbers are written with a decimal comma.
     pub decimal_comma: bool,
+    /// Numbers with a comma are put in quotes, where they are not.
+    pub quote_commas: bool,
 }
 
 impl<'a, 'w> Splice<'a, 'w> {
     pub fn new(bytes: &'a [u8], out: &'w mut dyn Write) -> Self {
-        Self { bytes, at: 0, out, decimal_comma: false }
+        Self { bytes, at: 0, out, decimal_comma: false, quote_commas: false }
     }
 
     /// Copies up to `range` and writes `with` in its place. Ranges must come in order.
@@ -199,6 +193,11 @@ impl<'a, 'w> Splice<'a, 'w> {
         put_number(&mut word, new);
         if self.decimal_comma {
             word.iter_mut().filter(|byte| **byte == b'.').for_each(|byte| *byte = b',');
+        }
+        let quoted = place.start > 0 && self.bytes.get(place.start - 1) == Some(&b'"');
+        if self.quote_commas && !quoted && word.contains(&b',') {
+            word.insert(0, b'"');
+            word.push(b'"');
         }
         self.replace(place, &word)
     }

@@ -8,7 +8,9 @@ use super::outgoing::INTENSITY;
 use super::scalar::Scalar;
 use super::scan::{Splice, moved};
 use super::single::check_single;
-use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, PointLayout, ReadOptions};
+use super::{
+    Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, PointLayout, ReadOptions, ReadSwitch,
+};
 use crate::Rigid;
 
 /// `.bin` files of points without a header, little endian. What a point is, [`ReadOptions::layout`] says; otherwise
@@ -27,6 +29,10 @@ impl CloudFormat for Kitti {
 
     fn recognises(&self, _bytes: &[u8]) -> bool {
         false // any bytes could be numbers
+    }
+
+    fn takes(&self) -> &'static [ReadSwitch] {
+        &[ReadSwitch::Layout]
     }
 
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {

@@ -1,20 +1,21 @@
 //! E57, the exchange format of terrestrial laser scanners, read and written by the `e57` crate.
 
+mod attributes;
 mod pages;
 mod poses;
+mod write;
 
 use std::io::{self, Cursor, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use e57::{E57Reader, E57Writer, PointCloud, Record, RecordDataType, RecordName, RecordValue};
+use e57::{E57Reader, PointCloud, Record, RecordDataType, RecordName, RecordValue};
 use nalgebra::{Quaternion, UnitQuaternion};
 
-use super::{CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, ScanEntry};
+use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, ScanEntry};
 use crate::Rigid;
 
 /// E57 files. The points of all scans are read, or of one of them, each scan moved by its pose into the
-/// coordinates of the file; points that the scanner marks as invalid are NaN. Written as one scan in double
-/// precision. A moved copy changes only the poses of scans and images, in double precision; all
+/// coordinates of the file; points that the scanner marks as invalid are NaN. Written as one scan. A moved copy changes only the poses of scans and images, in double precision; all
 /// else stays byte for byte.
 pub(super) struct E57;
 
@@ -51,8 +52,26 @@ impl CloudFormat for E57 {
         Ok(scans.iter().map(entry).collect())
     }
 
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        pages::check(bytes)?;
+        guarded(|| attributes::read(bytes, options))
+    }
+
+    fn left_out(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<String>, FormatError> {
+        pages::check(bytes)?;
+        guarded(|| attributes::left_out(bytes, options))
+    }
+
+    fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
+        write::keeps(attribute, cloud)
+    }
+
+    fn has_both_precisions(&self) -> bool {
+        true
+    }
+
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&guarded(|| file(cloud.points))?)
+        out.write_all(&guarded(|| write::file(cloud))?)
     }
 
     fn rewrite(
@@ -71,6 +90,9 @@ impl CloudFormat for E57 {
         out.write_all(&pages::with_xml(bytes, &poses::moved(&xml, motion, options.scan)?)?)
     }
 }
+
+/// What the columns of the extension for normals begin with.
+const NORMALS_NAMESPACE: &str = "nor";
 
 /// What goes wrong inside.
 enum E57Problem {
@@ -99,22 +121,9 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, E57Problem>) -> Result<T, FormatE
 fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, E57Problem> {
     let mut reader = E57Reader::new(Cursor::new(bytes))?;
     let mut points = Vec::new();
-    let scans = reader.pointclouds();
-    let count = scans.len();
-    if let Some(number) = options.scan.filter(|&number| number == 0 || number > count) {
-        return Err(E57Problem::Format(super::scans::no_such_scan(number, count)));
-    }
-    let wanted = |index: usize| options.scan.is_none_or(|number| number == index + 1);
+    let count = reader.pointclouds().len();
     let (mut viewpoint, mut single) = (None, true);
-    for (_, scan) in scans.into_iter().enumerate().filter(|(index, _)| wanted(*index)) {
-        let bits = scan.prototype.iter().map(|record| u128::from(bits(&record.data_type))).sum::<u128>();
-        if scan.records > 0 && (bits == 0 || bits * u128::from(scan.records) > 8 * bytes.len() as u128) {
-            let announced = format!("{} points of {bits} bits", scan.records);
-            return Err(E57Problem::Format(FormatError::truncated(
-                announced,
-                format!("{} bytes", bytes.len()),
-            )));
-        }
+    for scan in wanted(bytes, &reader.pointclouds(), options)? {
         let more = usize::try_from(scan.records).unwrap_or(usize::MAX);
         options.check_points(bytes.len(), points.len().saturating_add(more)).map_err(E57Problem::Format)?;
         let columns = XyzColumns::of(&scan.prototype).map_err(E57Problem::Format)?;
@@ -134,6 +143,41 @@ fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, E57Problem> {
         notes: if merged { vec![Note::Merged { scans: count }] } else { Vec::new() },
         ..Contents::default()
     })
+}
+
+/// The scans that are read, each checked against the bytes that are there.
+fn wanted(bytes: &[u8], scans: &[PointCloud], options: &ReadOptions) -> Result<Vec<PointCloud>, E57Problem> {
+    let count = scans.len();
+    if let Some(number) = options.scan.filter(|&number| number == 0 || number > count) {
+        return Err(E57Problem::Format(super::scans::no_such_scan(number, count)));
+    }
+    let is_wanted = |index: usize| options.scan.is_none_or(|number| number == index + 1);
+    let mut found = Vec::new();
+    for (_, scan) in scans.iter().enumerate().filter(|(index, _)| is_wanted(*index)) {
+        let bits = scan.prototype.iter().map(|record| u128::from(bits(&record.data_type))).sum::<u128>();
+        if scan.records > 0 && (bits == 0 || bits * u128::from(scan.records) > 8 * bytes.len() as u128) {
+            let announced = format!("{} points of {bits} bits", scan.records);
+            return Err(E57Problem::Format(FormatError::truncated(
+                announced,
+                format!("{} bytes", bytes.len()),
+            )));
+        }
+        found.push(scan.clone());
+    }
+    Ok(found)
+}
+
+/// The number in a column of a point; NaN where there is none.
+fn value(values: &[RecordValue], prototype: &[Record], column: usize) -> f64 {
+    match (values.get(column), prototype.get(column).map(|r| &r.data_type)) {
+        (Some(RecordValue::Single(value)), _) => f64::from(*value),
+        (Some(RecordValue::Double(value)), _) => *value,
+        (Some(RecordValue::ScaledInteger(n)), Some(RecordDataType::ScaledInteger { scale, offset, .. })) => {
+            *n as f64 * scale + offset
+        }
+        (Some(RecordValue::Integer(n) | RecordValue::ScaledInteger(n)), _) => *n as f64,
+        (None, _) => f64::NAN,
+    }
 }
 
 /// Where a scan stood, if the file says so.
@@ -188,16 +232,7 @@ impl XyzColumns {
     }
 
     fn point(&self, values: &[RecordValue], prototype: &[Record]) -> [f64; 3] {
-        let value = |column: usize| match (values.get(column), prototype.get(column).map(|r| &r.data_type)) {
-            (Some(RecordValue::Single(value)), _) => f64::from(*value),
-            (Some(RecordValue::Double(value)), _) => *value,
-            (
-                Some(RecordValue::ScaledInteger(n)),
-                Some(RecordDataType::ScaledInteger { scale, offset, .. }),
-            ) => *n as f64 * scale + offset,
-            (Some(RecordValue::Integer(n) | RecordValue::ScaledInteger(n)), _) => *n as f64,
-            (None, _) => f64::NAN,
-        };
+        let value = |column: usize| value(values, prototype, column);
         if self.invalid.is_some_and(|column| value(column) != 0.0) {
             return [f64::NAN; 3];
         }
@@ -207,24 +242,6 @@ impl XyzColumns {
         }
         [a * c.cos() * b.cos(), a * c.cos() * b.sin(), a * c.sin()]
     }
-}
-
-/// A whole file with one scan.
-fn file(points: &[[f64; 3]]) -> Result<Vec<u8>, E57Problem> {
-    let mut out = Cursor::new(Vec::new());
-    let mut writer = E57Writer::new(&mut out, "{00000000-0000-4000-8000-000000000000}")?;
-    let names = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
-    let kind = RecordDataType::Double { min: None, max: None };
-    let prototype = names.map(|name| Record { name, data_type: kind.clone() }).to_vec();
-    let mut scan = writer.add_pointcloud("{00000000-0000-4000-8000-000000000001}", prototype)?;
-    for point in points {
-        scan.add_point(point.map(RecordValue::Double).to_vec())?;
-    }
-    scan.finalize()?;
-    drop(scan);
-    writer.finalize()?;
-    drop(writer);
-    Ok(out.into_inner())
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 use nalgebra::Rotation3;
 
+use e57::E57Writer;
+
 use super::*;
 use crate::io::testing::{moved_copy, points_of};
 
@@ -42,6 +44,60 @@ fn a_moved_copy_has_other_poses() {
     assert!(near(&once, &motion) && near(&back, &Rigid::identity()));
     E57Reader::validate_crc(Cursor::new(&once)).unwrap();
     assert!(once.len() <= written(&points).len() + 1024, "the old XML is gone");
+}
+
+#[test]
+fn attributes_go_round_in_their_types() {
+    use crate::io::AttributeValues as V;
+    let of = |list: Vec<(&str, V)>| -> Vec<Attribute> {
+        list.into_iter().map(|(name, values)| Attribute { name: name.into(), values }).collect()
+    };
+    let colours = |make: fn([u8; 3]) -> V| {
+        vec![("red", make([255, 0, 7])), ("green", make([1, 2, 3])), ("blue", make([9, 8, 255]))]
+    };
+    let rest = vec![
+        ("intensity", V::F64(vec![0.25, -3.5, 1e-3])),
+        ("nx", V::F64(vec![1.0, 0.0, 0.6])),
+        ("ny", V::F64(vec![0.0, 1.0, 0.0])),
+        ("nz", V::F64(vec![0.0, 0.0, 0.8])),
+    ];
+    let bytes = of([colours(|c| V::U8(c.to_vec())), rest.clone()].concat());
+    let shares = of([colours(|c| V::F32(c.map(|part| f32::from(part) / 300.0).to_vec())), rest].concat());
+    for attributes in [bytes, shares] {
+        for single in [false, true] {
+            let mut file = Vec::new();
+            let points = [[0.5, 1.5, -2.5], [3.25, 4.0, 5.0], [6.0, 7.0, 8.0]];
+            let cloud = Outgoing { single, attributes: &attributes, ..Outgoing::of_points(&points) };
+            E57.write_cloud(&cloud, &mut file).unwrap();
+            let options = ReadOptions::default();
+            let contents = E57.read(&file, &options).unwrap();
+            assert_eq!((&contents.points[..], contents.single), (&points[..], single));
+            assert_eq!(E57.attributes(&file, &options).unwrap(), attributes);
+            assert_eq!(E57.left_out(&file, &options), Ok(Vec::new()));
+            // A moved copy has another pose; the normals turn with it.
+            let quarter = Rigid {
+                rotation: Rotation3::from_axis_angle(
+                    &nalgebra::Vector3::z_axis(),
+                    std::f64::consts::FRAC_PI_2,
+                )
+                .into_inner(),
+                ..Rigid::identity()
+            };
+            let mut moved = Vec::new();
+            moved_copy(&E57, &file, &quarter, &mut moved).unwrap();
+            let found = E57.attributes(&moved, &options).unwrap();
+            let normal = |at: usize| found[4..].iter().map(|a| a.values.get(at).unwrap()).collect::<Vec<_>>();
+            for (at, expected) in [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.6, 0.8]].into_iter().enumerate()
+            {
+                assert!(
+                    normal(at).iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12),
+                    "{at}: {:?}",
+                    normal(at)
+                );
+            }
+            assert_eq!(found[..4], attributes[..4]);
+        }
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use self::cloud::Message;
 use self::messages::{Topic, each_cloud};
 use super::scan::quote;
-use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ScanEntry};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ReadSwitch, ScanEntry};
 use crate::Rigid;
 
 /// MCAP files of ROS 2 (CDR) and ROS 1. The cloud is one message of one topic; where there are
@@ -123,6 +123,10 @@ impl CloudFormat for Mcap {
 
     fn recognises(&self, bytes: &[u8]) -> bool {
         bytes.starts_with(mcap::MAGIC)
+    }
+
+    fn takes(&self) -> &'static [ReadSwitch] {
+        &[ReadSwitch::Topic, ReadSwitch::Message]
     }
 
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {

@@ -14,7 +14,7 @@ use super::outgoing::stays_single;
 use super::poses::poses_not_points;
 use super::scalar::Scalar;
 use super::scan::moved;
-use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, axes};
+use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, ReadSwitch, axes};
 use crate::Rigid;
 
 const SINGLE: NpyKind = NpyKind { scalar: Scalar::F32, big_endian: false };
@@ -22,7 +22,7 @@ const DOUBLE: NpyKind = NpyKind { scalar: Scalar::F64, big_endian: false };
 
 /// An array `[n, columns]` of at least 3 columns, in C or Fortran order, of single or double
 /// precision or integers, whose first three columns are x, y and z; or an array `[n]` with fields
-/// `x`, `y` and `z`. Written as `float32` or `float64`. A moved copy keeps the other columns and fields as they
+/// `x`, `y` and `z`. Written as `float32` or `float64`, with attributes as an array of fields. A moved copy keeps the other columns and fields as they
 /// are, normals too, the order, and the type where it holds the moved numbers (otherwise it becomes
 /// `float64`).
 pub(super) struct Npy;
@@ -38,6 +38,10 @@ impl CloudFormat for Npy {
 
     fn recognises(&self, bytes: &[u8]) -> bool {
         bytes.starts_with(b"\x93NUMPY")
+    }
+
+    fn takes(&self) -> &'static [ReadSwitch] {
+        &[ReadSwitch::Columns]
     }
 
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
@@ -73,13 +77,24 @@ impl CloudFormat for Npy {
         true
     }
 
+    fn keeps(&self, _: &Attribute, _: &Outgoing<'_>) -> bool {
+        true
+    }
+
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
         let kind = if cloud.single { SINGLE } else { DOUBLE };
-        out.write_all(&NpyHeader::bytes(&Descr::Plain(kind), false, &[cloud.points.len() as u64, 3]))?;
-        let mut row = Vec::with_capacity(24);
-        cloud.points.iter().try_for_each(|point| {
+        let rows = cloud.points.len() as u64;
+        let (descr, shape) = if cloud.attributes.is_empty() {
+            (Descr::Plain(kind), vec![rows, 3])
+        } else {
+            (Descr::Fields(fields_of(cloud, kind)), vec![rows])
+        };
+        out.write_all(&NpyHeader::bytes(&descr, false, &shape))?;
+        let mut row = Vec::with_capacity(64);
+        cloud.points.iter().enumerate().try_for_each(|(index, point)| {
             row.clear();
             point.iter().for_each(|&c| kind.scalar.put(c, false, &mut row));
+            cloud.attributes.iter().for_each(|attribute| attribute.values.put(index, &mut row));
             out.write_all(&row)
         })
     }
@@ -142,6 +157,20 @@ impl CloudFormat for Npy {
         });
         out.write_all(&cells)
     }
+}
+
+/// The fields x, y and z of this type, and those of the attributes.
+fn fields_of(cloud: &Outgoing<'_>, kind: NpyKind) -> Vec<NpyField> {
+    let field = |name: &str, kind: NpyKind| {
+        // What would end the name in the header.
+        let name = name.replace(['\'', '"', '\\', '\n', '\r'], "_");
+        NpyField { name, descr: String::new(), kind: Some(kind), size: kind.scalar.size() }
+    };
+    let axes = ["x", "y", "z"].map(|axis| field(axis, kind)).into_iter();
+    let others = cloud.attributes.iter().map(|attribute| {
+        field(&attribute.name, NpyKind { scalar: attribute.values.scalar(), big_endian: false })
+    });
+    axes.chain(others).collect()
 }
 
 /// A column of an array.

@@ -91,3 +91,27 @@ fn bad_arrays() {
     let deep = "(".repeat(60_000);
     assert!(points_of(&Npy, &with_header(&format!("{{'shape': {deep}"), &[])).is_err());
 }
+
+#[test]
+fn attributes_are_fields() {
+    use crate::io::AttributeValues as V;
+    let attributes = [
+        ("red", V::U8(vec![255, 7])),
+        ("label", V::I64(vec![(1 << 53) + 1, -4])),
+        ("it's", V::F32(vec![0.5, 1.0])),
+    ]
+    .map(|(name, values)| Attribute { name: name.into(), values });
+    let points = [[1.0, 2.0, 3.0], [4.0, 5.5, -6.0]];
+    let mut bytes = Vec::new();
+    Npy.write_cloud(&Outgoing { attributes: &attributes, ..Outgoing::of_points(&points) }, &mut bytes)
+        .unwrap();
+    let header = String::from_utf8_lossy(&bytes[10..]).into_owned();
+    assert!(header.starts_with(
+        "{'descr': [('x', '<f8'), ('y', '<f8'), ('z', '<f8'), ('red', '<u1'), ('label', '<i8'), ('it_s', '<f4')], \
+         'fortran_order': False, 'shape': (2,), }"
+    ), "{header}");
+    assert_eq!(points_of(&Npy, &bytes).unwrap(), points);
+    let found = Npy.attributes(&bytes, &ReadOptions::default()).unwrap();
+    assert_eq!((found.len(), &found[..2]), (3, &attributes[..2]));
+    assert_eq!((found[2].name.as_str(), &found[2].values), ("it_s", &attributes[2].values));
+}

@@ -12,12 +12,12 @@ use arrow_schema::DataType;
 use self::columns::Place;
 use self::table::Table;
 use super::scalar::Scalar;
-use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ReadSwitch};
 use crate::Rigid;
 
 /// Parquet files. The points are the columns x, y and z of any type of numbers, or a column of lists
-/// or structures of three numbers; missing numbers are NaN. Written with the columns x, y and z in
-/// double precision. A moved copy keeps all other columns; nx, ny and nz are turned.
+/// or structures of three numbers; missing numbers are NaN. Written with the columns x, y and z, and
+/// one for each attribute. A moved copy keeps all other columns; nx, ny and nz are turned.
 pub(super) struct Parquet;
 
 fn read(bytes: &[u8], options: &ReadOptions) -> Result<(Table, Place, Vec<[f64; 3]>), FormatError> {
@@ -40,6 +40,10 @@ impl CloudFormat for Parquet {
 
     fn recognises(&self, bytes: &[u8]) -> bool {
         bytes.starts_with(b"PAR1")
+    }
+
+    fn takes(&self) -> &'static [ReadSwitch] {
+        &[ReadSwitch::Columns]
     }
 
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
@@ -88,8 +92,16 @@ impl CloudFormat for Parquet {
         Ok(attributes)
     }
 
+    fn keeps(&self, _: &Attribute, _: &Outgoing<'_>) -> bool {
+        true
+    }
+
+    fn has_both_precisions(&self) -> bool {
+        true
+    }
+
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&write::file(cloud.points)?)
+        out.write_all(&write::file(cloud)?)
     }
 
     fn rewrite(

@@ -188,3 +188,26 @@ fn schemas_that_are_too_deep_are_refused() {
     let error = thrift::check_footer(&table(vec![("a", deep(40))])).unwrap_err().to_string();
     assert!(error.contains("too deep"), "{error}");
 }
+
+#[test]
+fn attributes_are_columns() {
+    use crate::io::AttributeValues as V;
+    let attributes = [
+        ("red", V::U8(vec![255, 7])),
+        ("intensity", V::F32(vec![0.25, -1.0])),
+        ("label", V::I64(vec![(1 << 53) + 1, -4])),
+        ("time", V::F64(vec![1e9 + 0.1, 0.0])),
+    ]
+    .map(|(name, values)| Attribute { name: name.into(), values });
+    for single in [true, false] {
+        let mut bytes = Vec::new();
+        let cloud = Outgoing { single, attributes: &attributes, ..Outgoing::of_points(&EXPECTED) };
+        Parquet.write_cloud(&cloud, &mut bytes).unwrap();
+        let options = ReadOptions::default();
+        let contents = Parquet.read(&bytes, &options).unwrap();
+        assert_eq!((&contents.points[..], contents.single), (&EXPECTED[..], single));
+        let found = Parquet.attributes(&bytes, &options).unwrap();
+        assert_eq!((found.len(), &found[..2], &found[3]), (4, &attributes[..2], &attributes[3]));
+        assert_eq!(found[2].name, "label");
+    }
+}

@@ -1,8 +1,12 @@
 //! Writing Parquet, and moved copies of it.
 
+use std::ops::Range;
 use std::sync::Arc;
 
-use arrow_array::{ArrayRef, Float32Array, Float64Array, RecordBatch};
+use arrow_array::{
+    Array, ArrayRef, Float32Array, Float64Array, Int8Array, Int16Array, Int32Array, Int64Array, RecordBatch,
+    UInt8Array, UInt16Array, UInt32Array, UInt64Array,
+};
 use arrow_schema::{DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
@@ -12,7 +16,7 @@ use parquet::file::properties::WriterProperties;
 use super::super::outgoing::stays_single;
 use super::super::scalar::Scalar;
 use super::super::scan::{moved, turned};
-use super::super::{FormatError, ReadOptions};
+use super::super::{AttributeValues, FormatError, Outgoing, ReadOptions};
 use super::columns::{Place, numbers};
 use super::table::{Table, guarded};
 use crate::Rigid;
@@ -29,23 +33,55 @@ fn failed(error: FormatError) -> FormatError {
     FormatError::Unwritable(format!("cannot write Parquet: {error}"))
 }
 
-/// A file with the columns x, y and z in double precision.
-pub(super) fn file(points: &[[f64; 3]]) -> Result<Vec<u8>, FormatError> {
-    let schema = Arc::new(Schema::new(
-        ["x", "y", "z"].map(|axis| Field::new(axis, DataType::Float64, false)).to_vec(),
-    ));
+/// A file with the columns x, y and z and those of the attributes.
+pub(super) fn file(cloud: &Outgoing<'_>) -> Result<Vec<u8>, FormatError> {
+    let kind = if cloud.single { DataType::Float32 } else { DataType::Float64 };
+    let mut fields = ["x", "y", "z"].map(|axis| Field::new(axis, kind.clone(), false)).to_vec();
+    fields.extend(cloud.attributes.iter().map(|a| {
+        let values = &column_of(&a.values, 0..0);
+        Field::new(a.name.as_str(), values.data_type().clone(), false)
+    }));
+    let schema = Arc::new(Schema::new(fields));
     let written = guarded(|| {
         let mut writer = writer(&schema)?;
-        for part in points.chunks(ROWS) {
-            let column = |axis: usize| {
-                Arc::new(part.iter().map(|point| point[axis]).collect::<Float64Array>()) as ArrayRef
+        for (number, part) in cloud.points.chunks(ROWS).enumerate() {
+            let axis = |axis: usize| -> ArrayRef {
+                let values = part.iter().map(|point| point[axis]);
+                match kind {
+                    DataType::Float32 => Arc::new(values.map(|value| value as f32).collect::<Float32Array>()),
+                    _ => Arc::new(values.collect::<Float64Array>()),
+                }
             };
-            writer
-                .write(&RecordBatch::try_new(Arc::clone(&schema), vec![column(0), column(1), column(2)])?)?;
+            let begin = number * ROWS;
+            let mut columns = vec![axis(0), axis(1), axis(2)];
+            let rows = begin..begin + part.len();
+            columns.extend(cloud.attributes.iter().map(|a| column_of(&a.values, rows.clone())));
+            writer.write(&RecordBatch::try_new(Arc::clone(&schema), columns)?)?;
         }
         writer.into_inner()
     });
     written.map_err(failed)
+}
+
+/// Values as they are; 0 past their end.
+fn column_of(values: &AttributeValues, rows: Range<usize>) -> ArrayRef {
+    macro_rules! column {
+        ($values:expr, $array:ty) => {
+            Arc::new(rows.map(|row| $values.get(row).copied().unwrap_or_default()).collect::<$array>())
+        };
+    }
+    match values {
+        AttributeValues::I8(v) => column!(v, Int8Array),
+        AttributeValues::U8(v) => column!(v, UInt8Array),
+        AttributeValues::I16(v) => column!(v, Int16Array),
+        AttributeValues::U16(v) => column!(v, UInt16Array),
+        AttributeValues::I32(v) => column!(v, Int32Array),
+        AttributeValues::U32(v) => column!(v, UInt32Array),
+        AttributeValues::I64(v) => column!(v, Int64Array),
+        AttributeValues::U64(v) => column!(v, UInt64Array),
+        AttributeValues::F32(v) => column!(v, Float32Array),
+        AttributeValues::F64(v) => column!(v, Float64Array),
+    }
 }
 
 /// Three columns that change together.

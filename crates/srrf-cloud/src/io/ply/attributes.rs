@@ -7,16 +7,19 @@ use super::super::outgoing::COLOURS;
 use super::super::scalar::Scalar;
 use super::super::{Attribute, AttributeValues, FormatError, ReadOptions};
 use super::cursor::{Cursor, cut_short};
-use super::header::{PlyEncoding, PlyHeader, Property};
+use super::foreign::{self, is_passed_over};
+use super::header::{PlyEncoding, Property};
 
 /// Reads all properties of `vertex` but the place and lists.
 pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
-    let header = PlyHeader::parse(bytes)?;
+    let header = foreign::open(bytes)?;
     let (mut cursor, element) = Cursor::at_vertices(bytes, &header)?;
     let wanted: Vec<usize> = (0..element.properties.len())
         .filter(|&i| {
-            let Property { name, length, .. } = &element.properties[i];
-            length.is_none() && !["x", "y", "z"].contains(&&*name.to_ascii_lowercase())
+            let property = &element.properties[i];
+            let Property { name, length, .. } = property;
+            let place = ["x", "y", "z"].contains(&&*name.to_ascii_lowercase());
+            length.is_none() && !place && !is_passed_over(property)
         })
         .collect();
     if wanted.is_empty() {
@@ -65,11 +68,12 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>
 
 /// Names of the lists of `vertex`, and of the elements that are neither vertices nor faces.
 pub(super) fn left_out(bytes: &[u8]) -> Result<Vec<String>, FormatError> {
-    let header = PlyHeader::parse(bytes)?;
+    let header = foreign::open(bytes)?;
     let mut names = Vec::new();
     for element in &header.elements {
         if element.name == "vertex" {
-            names.extend(element.properties.iter().filter(|p| p.length.is_some()).map(|p| p.name.clone()));
+            let left_out = element.properties.iter().filter(|p| p.length.is_some() || is_passed_over(p));
+            names.extend(left_out.map(|p| p.name.clone()));
         } else if element.face_list().is_none() && element.count > 0 {
             names.push(element.name.clone());
         }

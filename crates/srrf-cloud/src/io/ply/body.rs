@@ -1,15 +1,15 @@
 //! The rows behind the header of a PLY file.
 
-use super::super::{Contents, FormatError, ReadOptions};
+use super::super::{Contents, FormatError, Note, ReadOptions};
 use super::cursor::{Cursor, cut_short, no_vertices};
 use super::faces::Faces;
-use super::header::{Element, PlyEncoding, PlyHeader};
+use super::foreign;
+use super::header::{Element, PlyEncoding};
 
 /// What a PLY file holds.
 pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
-    let header = PlyHeader::parse(bytes)?;
-    let needed = |element: &Element| element.name == "vertex" || element.face_list().is_some();
-    let end = header.elements.iter().rposition(needed).map_or(0, |last| last + 1);
+    let header = foreign::open(bytes)?;
+    let end = header.needed();
     let vertices = header.elements.iter().find(|element| element.name == "vertex").ok_or_else(no_vertices)?;
     let mut cursor = Cursor { bytes, at: header.body, encoding: header.encoding };
     let mut contents = Contents::default();
@@ -26,6 +26,7 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions) -> Result<Contents, Form
         }
     }
     let axes = axes(vertices)?;
+    contents.notes = foreign::passed_over(&header).into_iter().map(|what| Note::Ignored { what }).collect();
     contents.single = axes.iter().all(|&axis| vertices.properties[axis].scalar.is_single());
     Ok(contents)
 }

@@ -105,6 +105,15 @@ impl<'a> Cursor<'a> {
     pub fn skip_element(&mut self, element: &Element) -> Result<(), FormatError> {
         // Rows without properties take no bytes.
         let rows = if element.properties.is_empty() { 0 } else { element.count };
+        if let (PlyEncoding::Binary { .. }, Some(stride)) = (self.encoding, element.stride()) {
+            let whole = (self.bytes.len() - self.at) / stride.max(1);
+            let count = usize::try_from(rows).unwrap_or(usize::MAX);
+            if count > whole {
+                return Err(cut_short(element, whole as u64));
+            }
+            self.at += count * stride;
+            return Ok(());
+        }
         for row in 0..rows {
             for property in &element.properties {
                 if self.property(property)?.is_none() {

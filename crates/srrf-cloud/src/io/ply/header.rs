@@ -17,6 +17,8 @@ pub(super) struct Property {
     /// The type of the length, for a list.
     pub length: Option<Scalar>,
     pub scalar: Scalar,
+    /// The word of a type that is none of PLY's, or whose size is not the same everywhere. `scalar` has its size.
+    pub foreign: Option<String>,
     /// Where in the file the word of its type is.
     pub place: Range<usize>,
 }
@@ -66,12 +68,13 @@ fn scalar(name: &[u8]) -> Option<Scalar> {
     Some(match name {
         b"char" | b"int8" => Scalar::I8,
         b"uchar" | b"uint8" | b"bool" => Scalar::U8,
+        b"half" | b"float16" => Scalar::F16,
         b"short" | b"int16" => Scalar::I16,
         b"ushort" | b"uint16" => Scalar::U16,
         b"int" | b"int32" => Scalar::I32,
         b"uint" | b"uint32" => Scalar::U32,
-        b"int64" | b"long" | b"longlong" => Scalar::I64,
-        b"uint64" | b"ulong" | b"ulonglong" => Scalar::U64,
+        b"int64" | b"longlong" => Scalar::I64,
+        b"uint64" | b"ulonglong" => Scalar::U64,
         b"float" | b"float32" => Scalar::F32,
         b"double" | b"float64" => Scalar::F64,
         _ => return None,
@@ -79,6 +82,12 @@ fn scalar(name: &[u8]) -> Option<Scalar> {
 }
 
 impl PlyHeader {
+    /// How many of the elements are read: up to the last vertices or faces.
+    pub fn needed(&self) -> usize {
+        let needed = |element: &Element| element.name == "vertex" || element.face_list().is_some();
+        self.elements.iter().rposition(needed).map_or(0, |last| last + 1)
+    }
+
     /// # Errors
     /// [`FormatError`] with the line that cannot be understood.
     pub fn parse(bytes: &[u8]) -> Result<Self, FormatError> {
@@ -152,10 +161,24 @@ fn parse_property(line: &Line) -> Result<Property, FormatError> {
         let unknown = || line.error(format!("{} is not a type of PLY numbers", quote(word)));
         scalar(word).ok_or_else(unknown)
     };
+    let name = String::from_utf8_lossy(name).into_owned();
+    // Lists are how the rows are told apart.
+    let foreign = length.is_none() && scalar(kind.1).is_none();
+    if foreign && !is_word(kind.1) {
+        known(kind.1)?;
+    }
     Ok(Property {
-        name: String::from_utf8_lossy(name).into_owned(),
+        name,
         length: length.map(|(_, word)| known(word)).transpose()?,
-        scalar: known(kind.1)?,
+        scalar: if foreign { Scalar::F64 } else { known(kind.1)? },
+        foreign: foreign.then(|| String::from_utf8_lossy(kind.1).into_owned()),
         place: kind.0..kind.0 + kind.1.len(),
     })
+}
+
+/// Whether this may be the name of a type.
+fn is_word(word: &[u8]) -> bool {
+    word.len() <= 32
+        && word[0].is_ascii_alphabetic()
+        && word.iter().all(|b| b.is_ascii_alphanumeric() || *b == b'_')
 }

@@ -4,6 +4,7 @@ mod attributes;
 mod body;
 mod cursor;
 mod faces;
+mod foreign;
 mod header;
 mod rewrite;
 
@@ -131,7 +132,9 @@ mod tests {
         assert!(error("element vertex 3\nproperty float x\nproperty float y").contains("lacks"));
         assert!(error("element face 0\nproperty list uchar int i").contains("no element `vertex`"));
         assert!(error("property float x").contains("line 3"));
-        assert!(error("element vertex 3\nproperty quad x").contains("line 4: \"quad\" is not a type"));
+        assert!(
+            error("element vertex 3\nproperty list quad int x").contains("line 4: \"quad\" is not a type")
+        );
         // Rows without properties would be free of bytes: they are passed over.
         assert!(
             error(&format!("element ghost 18446744073709551615\nelement vertex 9\n{axes}")).contains("cut")
@@ -165,6 +168,84 @@ mod tests {
             assert_eq!(moved.len(), bytes.len() + 2 * 4 + 1);
             assert_eq!(copy(&moved, &motion.inverse()).len(), moved.len());
         }
+    }
+
+    #[test]
+    fn types_that_ply_does_not_have() {
+        use crate::io::{AttributeValues as V, Note};
+        let head = |format: &str, property: &str, rest: &str| {
+            format!(
+                "ply\nformat {format} 1.0\nelement vertex 2\nproperty float x\nproperty {property}\nproperty float y\n\
+                 property float z\n{rest}end_header\n"
+            )
+        };
+        let binary = |property: &str, value: &[u8], faces: bool| {
+            let list = "element face 1\nproperty list uchar int vertex_indices\n";
+            let mut bytes =
+                head("binary_little_endian", property, if faces { list } else { "" }).into_bytes();
+            for [x, y, z] in POINTS.map(|p| p.map(|c| c as f32)) {
+                bytes.extend(x.to_le_bytes());
+                bytes.extend(value);
+                bytes.extend([y, z].map(f32::to_le_bytes).concat());
+            }
+            if faces {
+                bytes.push(3);
+                bytes.extend([0i32, 1, 0].map(i32::to_le_bytes).concat());
+            }
+            bytes
+        };
+        let options = ReadOptions::default();
+        for faces in [false, true] {
+            for (property, value, values) in [
+                ("bool b", &[1][..], V::U8(vec![1; 2])),
+                ("long b", &7i32.to_le_bytes(), V::I32(vec![7; 2])),
+                ("long b", &(-7i64).to_le_bytes(), V::I64(vec![-7; 2])),
+                ("ulong b", &9u64.to_le_bytes(), V::U64(vec![9; 2])),
+                ("half b", &0x3c00u16.to_le_bytes(), V::F32(vec![1.0; 2])),
+            ] {
+                let bytes = binary(property, value, faces);
+                let contents = Ply.read(&bytes, &options).unwrap();
+                assert_eq!((&contents.points[..], contents.notes.len()), (&POINTS[..], 0), "{property}");
+                assert_eq!(Ply.attributes(&bytes, &options).unwrap()[0].values, values, "{property}");
+            }
+            for size in [1, 2, 4, 8] {
+                let bytes = binary("quad b", &vec![9; size], faces);
+                let contents = Ply.read(&bytes, &options).unwrap();
+                assert_eq!(contents.points, POINTS);
+                let [Note::Ignored { what }] = &contents.notes[..] else { panic!("{:?}", contents.notes) };
+                assert_eq!(what, "the property `b`, whose type `quad` PLY does not have");
+                assert_eq!(Ply.attributes(&bytes, &options), Ok(vec![]));
+                assert_eq!(Ply.left_out(&bytes, &options), Ok(vec!["b".to_owned()]));
+            }
+        }
+        let text = format!("{}1.5 many -2 0.25\n4 few 5 -6.5\n", head("ascii", "string b", ""));
+        let contents = Ply.read(text.as_bytes(), &options).unwrap();
+        assert_eq!((&contents.points[..], contents.notes.len()), (&POINTS[..], 1));
+        // Nothing tells the size, or it is the place.
+        for (bytes, facts) in [
+            (
+                binary("quad b", &[9; 3], false),
+                ["`b` of the element `vertex` has the type `quad`", "no size of it fits"],
+            ),
+            (
+                binary("long b", &[9; 2], true),
+                ["`b` of the element `vertex` has the type `long`", "leave that property out"],
+            ),
+            (
+                binary("float b\nproperty quad c\nproperty trio d", &[9; 6], true),
+                ["`c` of", "one more such type"],
+            ),
+        ] {
+            let error = Ply.read(&bytes, &options).unwrap_err().to_string();
+            assert!(facts.iter().all(|fact| error.contains(fact)), "{error}");
+        }
+        let place = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty quad x\nproperty float y\n\
+                     property float z\nend_header\n";
+        let error = Ply.read(&[place.as_bytes(), &[0; 16]].concat(), &options).unwrap_err().to_string();
+        assert!(error.contains("the coordinate `x` has the type `quad`"), "{error}");
+        let empty = head("binary_little_endian", "quad b", "").replace("vertex 2", "vertex 0");
+        let error = Ply.read(empty.as_bytes(), &options).unwrap_err().to_string();
+        assert!(error.contains("several sizes of it fit"), "{error}");
     }
 
     #[test]

@@ -9,7 +9,8 @@ use super::super::scalar::Scalar;
 use super::super::scan::{Splice, moved, put_number, turned};
 use super::body::read;
 use super::cursor::Cursor;
-use super::header::{PlyEncoding, PlyHeader};
+use super::foreign;
+use super::header::PlyEncoding;
 use crate::Rigid;
 
 /// What happens to one property of `vertex`.
@@ -31,7 +32,7 @@ pub(super) fn rewrite(
     out: &mut dyn Write,
 ) -> io::Result<()> {
     let points = read(bytes, options)?.points;
-    let header = PlyHeader::parse(bytes)?;
+    let header = foreign::open(bytes)?;
     let (mut cursor, element) = Cursor::at_vertices(bytes, &header)?;
     let Some(axes) = element.triple(["x", "y", "z"]) else { return Err(io::ErrorKind::InvalidData.into()) };
     let normals = element.triple(["nx", "ny", "nz"]);

@@ -5,8 +5,9 @@ use std::io::{self, Write};
 use super::super::npy::known;
 use super::super::outgoing::{COLOURS, INTENSITY};
 use super::super::scalar::Scalar;
-use super::super::scan::{ByteLines, number, put_number, put_single};
+use super::super::scan::{number, put_number, put_single};
 use super::super::{Attribute, AttributeValues, FormatError, Outgoing, ReadOptions};
+use super::fields::{Records, is_missing};
 use super::row::{Style, TextRow};
 
 /// More columns than these are not attributes of points.
@@ -41,9 +42,11 @@ impl ColumnCollector {
             self.first = Some(start);
             self.fields = row.style.fields(text).count();
             let others = row.style.fields(text).enumerate().filter(|(_, (at, _))| !is_place(*at));
-            // A separator at the end of a line closes it.
+            // A separator at the end of a line closes it, but where the title has a name for what follows.
             self.columns = others
-                .filter(|(index, (_, word))| !word.is_empty() || index + 1 < self.fields)
+                .filter(|(index, (_, word))| {
+                    !word.is_empty() || index + 1 < self.fields || *index < row.width
+                })
                 .map(|(index, _)| (index, Some(Vec::new())))
                 .take(MOST_COLUMNS)
                 .collect();
@@ -89,7 +92,11 @@ fn decimal(style: Style, word: &[u8]) -> Option<f64> {
     if let Ok(value) = number(word) {
         return Some(value);
     }
-    let comma = matches!(style, Style::SpaceDecimalComma | Style::Semicolon) && word.contains(&b',');
+    if is_missing(word) {
+        return Some(f64::NAN);
+    }
+    let spaced = matches!(style, Style::SpaceDecimalComma | Style::Semicolon | Style::Tab);
+    let comma = spaced && word.contains(&b',');
     let point: Vec<u8> = word.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
     number(&point).ok().filter(|_| comma)
 }
@@ -105,7 +112,7 @@ fn title(bytes: &[u8], first: usize, fields: usize) -> Option<Vec<String>> {
         let is_title = words.len() == fields && words.iter().any(|word| number(word).is_err());
         is_title.then(|| words.iter().map(|w| String::from_utf8_lossy(w).trim().to_owned()).collect())
     };
-    ByteLines::new(head).filter_map(|line| names(line.text)).last()
+    Records::new(head).filter_map(|line| names(line.text)).last()
 }
 
 impl OtherColumns {
@@ -121,7 +128,8 @@ impl OtherColumns {
     }
 }
 
-fn smallest(list: &[f64]) -> AttributeValues {
+/// The numbers in the smallest type that holds them.
+pub(in super::super) fn smallest(list: &[f64]) -> AttributeValues {
     let whole = |least: f64, most: f64| {
         list.iter().all(|value| value.fract() == 0.0 && (least..=most).contains(value))
     };

@@ -1,18 +1,20 @@
 //! Plain text: one point a line, at least three numbers.
 
 mod attributes;
+mod fields;
 mod row;
 mod title;
 
 use std::io::{self, Write};
 
-pub(super) use self::attributes::fits_single;
 use self::attributes::{ColumnCollector, OtherColumns};
-use self::row::{Style, TextRow};
+pub(super) use self::attributes::{fits_single, smallest};
+use self::fields::Records;
+use self::row::{QuotedComma, Style, Table, TextRow, of_thousands};
 use self::title::{TitleNames, is_comment, is_title};
 use super::poses::poses_not_points;
-use super::scan::{ByteLines, Line, Splice, moved, number};
-use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
+use super::scan::{Line, Splice, moved, number};
+use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, ReadSwitch};
 use crate::Rigid;
 
 /// Numbers separated by spaces, tabs, commas or semicolons, a line for each point. x, y and z are
@@ -47,6 +49,10 @@ impl CloudFormat for Text {
         matches!(parsed, Err(FormatError::Unclear { .. })) || (parsed.is_ok() && rows > 0)
     }
 
+    fn takes(&self) -> &'static [ReadSwitch] {
+        &[ReadSwitch::Columns]
+    }
+
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
         let mut points = Vec::new();
         let mut poses = PoseRows::new(options);
@@ -72,7 +78,10 @@ impl CloudFormat for Text {
                 Err(FormatError::truncated(format!("{count} points"), points.len().to_string()))
             }
             _ => {
-                let notes = if parsed.numbered { vec![Note::NumberedTitle] } else { Vec::new() };
+                let mut notes = if parsed.numbered { vec![Note::NumberedTitle] } else { Vec::new() };
+                if parsed.missing > 0 {
+                    notes.push(Note::EmptyCells { rows: parsed.missing });
+                }
                 Ok(Contents { notes, ..Contents::of_points(points) })
             }
         }
@@ -110,12 +119,12 @@ impl CloudFormat for Text {
         match extension {
             "csv" => {
                 matches!(style, Style::Comma | Style::Semicolon)
-                    && ByteLines::new(head).any(|line| is_title(line.text))
+                    && Records::new(head).any(|line| is_title(line.text, false))
             }
             "pts" => style == Style::Space && announced.is_ok_and(|parsed| parsed.announced.is_some()),
             "xyz" => {
                 let passed_over = |text: &[u8]| text.trim_ascii().is_empty() || is_comment(text);
-                style == Style::Space && ByteLines::new(head).all(|line| passed_over(line.text))
+                style == Style::Space && Records::new(head).all(|line| passed_over(line.text))
             }
             _ => true,
         }
@@ -132,10 +141,13 @@ impl CloudFormat for Text {
         let mut splice = Splice::new(bytes, out);
         parse(bytes, options, |line, row| {
             splice.decimal_comma = match row.style {
-                Style::Space | Style::Comma => false,
                 Style::SpaceDecimalComma => true,
-                Style::Semicolon => line.text.contains(&b','),
+                Style::Semicolon | Style::Tab => line.text.contains(&b','),
+                Style::Space | Style::Comma => {
+                    row.places.iter().any(|place| line.text[place.clone()].contains(&b','))
+                }
             };
+            splice.quote_commas = row.style == Style::Comma;
             let places = row.places.map(|place| line.start + place.start..line.start + place.end);
             splice.numbers(&places, row.point, moved(motion, row.point))
         })?;
@@ -163,6 +175,8 @@ struct Parsed {
     numbered: bool,
     /// Fields of the first row.
     width: usize,
+    /// Rows that lack a coordinate.
+    missing: usize,
 }
 
 /// Goes through the points.
@@ -175,11 +189,12 @@ fn parse<E: From<FormatError>>(
         return Err(FormatError::Content("the text is UTF-16; save it as UTF-8 or ASCII".into()).into());
     }
     let mut parsed = Parsed::default();
-    let mut columns = [0, 1, 2];
+    let mut table = Table::of_points();
     let mut heads = TitleNames::default();
     let mut rows = 0usize;
     let mut whole = None;
-    let mut lines = ByteLines::new(bytes);
+    let (mut doubted, mut decimal) = (None, false);
+    let mut lines = Records::new(bytes);
     while let Some(mut line) = lines.next() {
         if line.number == 1 && line.text.starts_with("\u{feff}".as_bytes()) {
             line = Line { start: 3, text: &line.text[3..], ..line };
@@ -198,6 +213,10 @@ fn parse<E: From<FormatError>>(
             continue;
         }
         if rows == 0 {
+            // Spreadsheets leave rows without anything, and may say first what separates.
+            if title::is_blank(trimmed) || (line.number == 1 && title::says_separator(trimmed)) {
+                continue;
+            }
             if parsed.announced.is_none()
                 && let Some(count) = std::str::from_utf8(trimmed).ok().and_then(|word| word.parse().ok())
             {
@@ -206,7 +225,7 @@ fn parse<E: From<FormatError>>(
             }
             let next = lines.clone().next().map_or(&b""[..], |line| line.text);
             let numbered = heads.title.is_none() && title::is_numbered(line.text, next);
-            if numbered || is_title(line.text) {
+            if numbered || is_title(line.text, heads.title.is_some()) {
                 if heads.title.is_some() {
                     return Err(line.error("a second title; a point is expected").into());
                 }
@@ -214,18 +233,21 @@ fn parse<E: From<FormatError>>(
                 parsed.numbered = numbered;
                 continue;
             }
-            parsed.width = title::width(line.text);
-            columns = match parsed.numbered {
+            let title = heads.title.or(heads.comments.last().copied());
+            table.look_at_tabs(title, std::iter::once(line.text).chain(lines.clone().map(|line| line.text)));
+            parsed.width = title::width(table.style(line.text), line.text);
+            (table.columns, table.width) = match parsed.numbered {
                 true => {
                     let index = usize::from(
                         heads.title.is_some_and(|title| title.trim_ascii_start().starts_with(b",")),
                     );
-                    [index, index + 1, index + 2]
+                    ([index, index + 1, index + 2], 0)
                 }
-                false => title::columns_of(&heads, &line, next, options)?,
+                false => title::columns_of(&heads, &line, next, &table, options)?,
             };
+            table.width = table.width.max(parsed.width);
         }
-        let row = TextRow::parse(line.text, columns).map_err(|problem| line.error(problem))?;
+        let row = TextRow::parse(line.text, &table).map_err(|problem| line.error(problem))?;
         if let Some(count) = row.whole_numbers(line.text)
             && *whole.get_or_insert(count) != count
         {
@@ -233,10 +255,18 @@ fn parse<E: From<FormatError>>(
                            or separate the fields by semicolons";
             return Err(line.error(problem).into());
         }
+        decimal |= row.comma == Some(QuotedComma::Decimal);
+        if row.comma == Some(QuotedComma::Either) && doubted.is_none() {
+            doubted = Some(line.error(of_thousands(line.text, &row.places)));
+        }
+        parsed.missing += usize::from(row.missing);
         rows += 1;
         each(&line, row)?;
     }
-    Ok(parsed)
+    match doubted {
+        Some(error) if !decimal => Err(error.into()),
+        _ => Ok(parsed),
+    }
 }
 
 /// Rows that may be poses instead of points.
@@ -273,76 +303,8 @@ impl PoseRows {
 
 /// The first three numbers of a line.
 pub fn parse_point(line: &str) -> Result<[f64; 3], String> {
-    TextRow::parse(line.as_bytes(), [0, 1, 2]).map(|row| row.point)
+    TextRow::parse(line.as_bytes(), &Table::of_points()).map(|row| row.point)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::io::testing::{moved_copy, points_of};
-
-    fn read(text: &str) -> Result<Vec<[f64; 3]>, FormatError> {
-        points_of(&Text, text.as_bytes())
-    }
-
-    #[test]
-    fn separators_titles_and_comments() {
-        let expected = vec![[1.0, -2.5, 3e-3], [4.0, 5.0, 6.0]];
-        for text in [
-            "1 -2.5 3e-3\n4 5 6",
-            "# made by hand\r\n1,-2.5,0.003,0,0,1\r\n\r\n4,5,6,1,0,0\r\n",
-            "x,y,z\n1;-2.5;.003\n4\t5   6 255 0 0\n",
-            "2\n1 -2.5 0.003\n4 5 6\n",
-            "\u{feff}//X Y Z\n1 -2.5 0.003\n4 5 6\n",
-            "1 -2.5 0.003\r4 5 6\r",
-            "1,0 -2,5 0,003\n4 5 6\n",
-            "x;y;z\r\n1,0;-2,5;0,003\r\n4;5;6\r\n",
-            // columns by name
-            "id,Z,Y,X\n7,0.003,-2.5,1\n8,6,5,4\n",
-            "# id x y z\n7 1 -2.5 0.003\n8 4 5 6\n",
-            "# where x y z are metres\n1 -2.5 0.003\n4 5 6\n",
-        ] {
-            assert_eq!(read(text).unwrap(), expected, "{text:?}");
-        }
-        assert!(read("nan 0 0").unwrap()[0][0].is_nan());
-    }
-
-    #[test]
-    fn bad_lines_are_numbered() {
-        assert_eq!(read("1 2 3\n4 5"), Err(FormatError::line(2, "2 numbers where x, y and z are expected")));
-        assert_eq!(read("#\n1 2 3\n4 five 6"), Err(FormatError::line(3, "\"five\" is not a number")));
-        assert!(read("1 2 x3").is_err());
-        assert!(matches!(read("3\n1 2 3\n4 5 6"), Err(FormatError::Truncated { .. })));
-        assert!(read("1\n1 2 3\n4 5 6").is_err());
-        assert!(read("a b c\n1 2 3").unwrap_err().to_string().contains("columns are a, b, c"));
-        assert!(read("a b c\nd e f\n1 2 3").unwrap_err().to_string().contains("line 2"));
-        assert!(read("1,5,2,5,3,5\n1,2,5,3,5\n").unwrap_err().to_string().contains("line 2"));
-        assert!(points_of(&Text, &[0xff, 0xfe, 0x31, 0x00]).unwrap_err().to_string().contains("UTF-16"));
-        assert!(points_of(&Text, &[0x31, 0x20, 0xff, 0x20, 0x32]).is_err());
-        assert_eq!(read(""), Ok(vec![]));
-    }
-
-    #[test]
-    fn a_moved_copy_keeps_the_rest() {
-        let motion = Rigid { translation: [1.0, 0.5, -2.0].into(), ..Rigid::identity() };
-        let copy = |text: &str| {
-            let mut out = Vec::new();
-            moved_copy(&Text, text.as_bytes(), &motion, &mut out).unwrap();
-            String::from_utf8(out).unwrap()
-        };
-        assert_eq!(copy("#  a\r\n1.0, 2, 3, 255 ,0\r\n\r\n"), "#  a\r\n2, 2.5, 1, 255 ,0\r\n\r\n");
-        assert_eq!(copy("1,5 2 3 0,10"), "2,5 2,5 1 0,10");
-        assert_eq!(copy("2\nnan 0 0 red\n0 0 0 blue"), "2\nnan 0 0 red\n1 0.5 -2 blue");
-    }
-
-    #[test]
-    fn text_is_recognised() {
-        for text in ["1 2 3\n", "x,y,z\n1,2,3", "5\n1 2 3\n", "# a\n\n1;2;3"] {
-            assert!(Text.recognises(text.as_bytes()), "{text}");
-        }
-        for text in ["", "# a\n", "hello", "v 1 2 3\n", "1 2\n", "12\n"] {
-            assert!(!Text.recognises(text.as_bytes()), "{text}");
-        }
-        assert!(Text.recognises("1 2 3\n".repeat(2000).as_bytes()));
-    }
-}
+mod tests;

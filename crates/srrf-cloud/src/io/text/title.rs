@@ -2,7 +2,8 @@
 
 use super::super::scan::{Line, number, words};
 use super::super::{FormatError, ReadOptions, axes};
-use super::row::Style;
+use super::fields::{is_missing, without_quoted};
+use super::row::{Style, Table};
 
 /// Longest line that may be a title.
 const LONGEST: usize = 1 << 20;
@@ -25,15 +26,38 @@ fn uncommented(text: &[u8]) -> &[u8] {
 /// Whether a line begins as a comment.
 pub(super) fn is_comment(text: &[u8]) -> bool {
     let text = text.trim_ascii();
-    text.starts_with(b"#") || text.starts_with(b"//") || text.starts_with(b"%")
+    let begins = |text: &[u8]| {
+        let end = text.iter().position(|b| b",;\t ".contains(b)).unwrap_or(text.len());
+        is_missing(&text[..end])
+    };
+    (text.starts_with(b"#") && !begins(text)) || text.starts_with(b"//") || text.starts_with(b"%")
 }
 
-/// Whether a line is made of words, and of no number.
-pub(super) fn is_title(text: &[u8]) -> bool {
-    if text.len() > LONGEST || text.iter().any(|b| b.is_ascii_control() && *b != b'\t') {
+/// Whether a line has separators only.
+pub(super) fn is_blank(text: &[u8]) -> bool {
+    text.iter().all(|b| b",;\t ".contains(b))
+}
+
+/// Whether a line tells Excel what separates, such as `sep=;`.
+pub(super) fn says_separator(text: &[u8]) -> bool {
+    let bare = text.strip_prefix(b"\"").unwrap_or(text);
+    text.len() <= 8 && bare.get(..4).is_some_and(|word| word.eq_ignore_ascii_case(b"sep="))
+}
+
+/// Whether a line is made of words, and of no number. Words that stand for nothing are a row, where there is a title
+/// already.
+pub(super) fn is_title(text: &[u8], titled: bool) -> bool {
+    if text.len() > LONGEST || text.iter().any(|b| b.is_ascii_control() && !b"\t\r\n".contains(b)) {
         return false;
     }
     let mut fields = Style::of(text).fields(text).filter(|(_, field)| !field.is_empty()).peekable();
+    let missing = |mut all: super::fields::Fields<'_>| match titled {
+        true => all.any(|(_, field)| !field.is_empty() && is_missing(field)),
+        false => all.all(|(_, field)| is_missing(field)),
+    };
+    if missing(Style::of(text).fields(text)) {
+        return false;
+    }
     let word = |field: &[u8]| {
         field.first().is_some_and(|b| b.is_ascii_alphabetic() || !b.is_ascii() || b"\"'_#/[(".contains(b))
     };
@@ -57,10 +81,22 @@ pub(super) fn is_numbered(text: &[u8], next: &[u8]) -> bool {
 /// The names in a title.
 pub(super) fn names(title: &[u8]) -> Vec<String> {
     let text = uncommented(title);
-    let separator = [b';', b'\t', b','].into_iter().find(|byte| text.contains(byte));
-    let name = |word: &[u8]| String::from_utf8_lossy(word.trim_ascii()).trim_matches('"').trim().to_owned();
+    let bare = without_quoted(text);
+    let separator = [b';', b'\t', b','].into_iter().find(|byte| bare.contains(byte));
+    let name = |word: &[u8]| {
+        let text = String::from_utf8_lossy(word.trim_ascii());
+        text.trim_matches('"').split_whitespace().collect::<Vec<_>>().join(" ")
+    };
     let mut names: Vec<String> = match separator {
-        Some(separator) => text.split(|&byte| byte == separator).map(name).collect(),
+        Some(separator) => {
+            let mut begin = 0;
+            let parts = bare.split(|&byte| byte == separator).map(|part| {
+                let part = begin..begin + part.len();
+                begin = part.end + 1;
+                name(&text[part])
+            });
+            parts.collect()
+        }
         None => {
             let mut names: Vec<String> = Vec::new();
             for (_, word) in words(text) {
@@ -80,12 +116,13 @@ pub(super) fn names(title: &[u8]) -> Vec<String> {
 }
 
 /// Fields of a row, those apart that are empty at its end.
-pub(super) fn width(text: &[u8]) -> usize {
-    let fields = Style::of(text).fields(text).enumerate();
+pub(super) fn width(style: Style, text: &[u8]) -> usize {
+    let fields = style.fields(text).enumerate();
     fields.filter(|(_, (_, field))| !field.is_empty()).last().map_or(0, |(index, _)| index + 1)
 }
 
-/// The columns of x, y and z, from what stands before the `first` point and the line after it.
+/// The columns of x, y and z, from what stands before the `first` point and the line after it; and how many columns a
+/// title announces.
 ///
 /// # Errors
 /// [`FormatError`] where a title does not say them.
@@ -93,18 +130,33 @@ pub(super) fn columns_of(
     heads: &TitleNames,
     first: &Line,
     next: &[u8],
+    table: &Table,
     options: &ReadOptions,
-) -> Result<[usize; 3], FormatError> {
-    let width = width(first.text);
+) -> Result<([usize; 3], usize), FormatError> {
+    let width = width(table.style(first.text), first.text);
     let shift = |names: &[String]| usize::from(width == names.len() + 1 && has_index(first.text, next));
     let asked = options.columns.as_ref();
     if let Some(title) = heads.title {
         let names = names(title);
         if names.len() >= 3 {
             let shift = shift(&names);
-            return axes::choose(&names, asked).map(|axes| axes.map(|axis| axis + shift));
+            let chosen = axes::choose(&names, asked);
+            return chosen.map(|axes| (axes.map(|axis| axis + shift), names.len() + shift));
         }
     }
+    columns_of_comments(heads, first, next, width, options).map(|columns| (columns, 0))
+}
+
+/// As [`columns_of`], where no title says it.
+fn columns_of_comments(
+    heads: &TitleNames,
+    first: &Line,
+    next: &[u8],
+    width: usize,
+    options: &ReadOptions,
+) -> Result<[usize; 3], FormatError> {
+    let shift = |names: &[String]| usize::from(width == names.len() + 1 && has_index(first.text, next));
+    let asked = options.columns.as_ref();
     for comment in heads.comments.iter().rev().filter(|comment| comment.len() < LONGEST) {
         let names = names(comment);
         let fits = names.len() == width || names.len() + 1 == width || (names.len() > width && width >= 3);

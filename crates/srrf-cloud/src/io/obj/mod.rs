@@ -1,9 +1,12 @@
 //! OBJ, Wavefront's text format.
 
+mod colours;
+
 use std::io::{self, Write};
 
-use super::scan::{ByteLines, Line, Splice, moved, number, quote, turned, write_rows};
-use super::{CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
+use super::outgoing::COLOURS;
+use super::scan::{ByteLines, Line, Splice, moved, number, quote, turned};
+use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// The words with which lines of an OBJ file begin.
@@ -134,8 +137,16 @@ impl CloudFormat for Obj {
         Ok(Contents { points, faces, notes, ..Contents::default() })
     }
 
+    fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
+        colours::read(bytes, options)
+    }
+
+    fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
+        COLOURS.contains(&attribute.name.as_str()) && cloud.triple(COLOURS).is_some()
+    }
+
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
-        write_rows(cloud.points, "v ", out)
+        colours::write(cloud, out)
     }
 
     fn rewrite(
@@ -234,6 +245,29 @@ mod tests {
         moved_copy(&Obj, TEXT.as_bytes(), &motion, &mut copy).unwrap();
         let expected = TEXT.replace("v 1 2.0 3", "v 1 -3 2").replace("vn 0 0 1", "vn 0 -1 0");
         assert_eq!(String::from_utf8(copy).unwrap(), expected.replace("-1 0 1e2", "-1 -100 0"));
+    }
+
+    #[test]
+    fn colours_of_vertices() {
+        use crate::io::AttributeValues as V;
+        let of = |text: &str| Obj.attributes(text.as_bytes(), &ReadOptions::default()).unwrap();
+        let named = |values: [V; 3]| -> Vec<Attribute> {
+            let names = COLOURS.iter().zip(values);
+            names.map(|(name, values)| Attribute { name: (*name).into(), values }).collect()
+        };
+        let eight = named([V::U8(vec![255, 0]), V::U8(vec![128, 0]), V::U8(vec![0, 51])]);
+        assert_eq!(of("v 1 2 3 1 0.501961 0\nv 4 5 6 0 0 0.2\nf 1 2 1\n"), eight);
+        assert_eq!(of("v 1 2 3 255 128 0\nv 4 5 6 0 0 51\n"), eight);
+        assert_eq!(of("v 1 2 3 0.3 0.5 0.7\n"), named([0.3, 0.5, 0.7].map(|v| V::F32(vec![v]))));
+        // A weight is no colour, and neither is one that only some have.
+        assert!(of("v 1 2 3 1\n").is_empty() && of("v 1 2 3 1 0 0\nv 1 2 3\n").is_empty());
+        let points = [[1.0, 2.0, 3.0], [4.0, 5.5, 6.0]];
+        let mut out = Vec::new();
+        let cloud = Outgoing { attributes: &eight, ..Outgoing::of_points(&points) };
+        Obj.write_cloud(&cloud, &mut out).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        assert_eq!(text, "v 1 2 3 1 0.5019608 0\nv 4 5.5 6 0 0 0.2\n");
+        assert_eq!(of(&text), eight);
     }
 
     #[test]
