@@ -8,11 +8,12 @@ use crate::graph::GraphEdge;
 use crate::joint::{Joint, refine_jointly};
 use crate::loops::CLOSES;
 use crate::map::{Map, PairChoice};
+use crate::near::overlapping;
 use crate::options::{AlignError, AlignOptions, AlignProgress, AlignStage};
 use crate::pair::{PairStore, RegisterPairs, Scans};
 use crate::placed::{Finished, place};
 use crate::pool::{PairPool, Workplace};
-use crate::rounds::{Rounds, overlapping};
+use crate::rounds::Rounds;
 use crate::surface::ScanSurface;
 
 /// Thinned points of all scans together, where they are many.

@@ -4,17 +4,22 @@ use serde::{Serialize, Serializer};
 use srrf_cloud::Rigid;
 
 use crate::belief::beliefs;
-use crate::graph::{GraphEdge, optimise};
-use crate::loops::{CLOSES, EdgeLoop, triangles, ways_round};
-use crate::trees::{components, spanning_tree};
+use crate::graph::GraphEdge;
+use crate::loops::{CLOSES, EdgeLoop, ways_round};
+use crate::trees::{Union, components, spanning_tree};
+use crate::truncated::{move_to_optimum, truncated};
+use crate::trust::{logit, of_logit, shift};
 
 /// An edge below this is rather wrong than right.
 pub const HALF: f64 = 0.5;
-/// An edge that a loop speaks against, and none for, joins only above this.
-const SURE: f64 = 0.8;
-/// How fast the loss is made less convex, as in the paper.
-const HARDER: f64 = 1.4;
-const MOST_HARDENINGS: usize = 60;
+/// An edge that no loop confirms joins only from here on: a wrong map costs more than two right ones.
+const SURE: f64 = 0.9;
+/// Where the odds of all edges are lowered by more than this (a logarithm), places look alike.
+const LOOK_ALIKE: f64 = -1.0;
+/// The odds of all edges are lowered, and the loops asked again, so many times.
+const MOST_SHIFTS: usize = 6;
+/// ...or until they change by less.
+const STILL: f64 = 0.02;
 
 /// What became of an edge. [`std::fmt::Display`] gives the name in results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,17 +68,58 @@ pub struct Consensus {
     /// Loops that close with two or more edges which contradict the map: wrong edges do not agree by chance, so that either these are
     /// right, or places look alike.
     pub rivals: Vec<EdgeLoop>,
+    /// Whether sure pairs turned out wrong so often that none joins by itself.
+    pub look_alike: bool,
 }
 
-/// Finds it. `prior` is the probability of each edge by its registration; `abstains` says where that is too little.
-pub fn agree(nodes: usize, edges: &[GraphEdge], prior: &[f64], abstains: &[bool]) -> Consensus {
-    let mut all = triangles(nodes, edges, prior);
-    let first = beliefs(prior, &all);
-    let unasked: Vec<bool> =
-        heard(edges.len(), &first, &all).iter().map(|(supported, _)| !supported).collect();
-    all.extend(ways_round(nodes, edges, &first, &unasked));
-    let posterior = beliefs(prior, &all);
-    let joins = joining(edges.len(), &posterior, abstains, &all);
+/// What is known of the edges, one value an edge.
+#[derive(Clone, Copy)]
+pub struct Evidence<'a> {
+    /// Probability by the registration; 0 where nothing was measured.
+    pub prior: &'a [f64],
+    /// What else speaks for it, in log odds.
+    pub sight: &'a [f64],
+    /// Whether the registration abstains.
+    pub abstains: &'a [bool],
+    /// Whether the user says that the scans overlap.
+    pub vouched: &'a [bool],
+    /// Short loops of them.
+    pub loops: &'a [EdgeLoop],
+    /// Whether a loop that closes says nothing.
+    pub implied: &'a dyn Fn(&EdgeLoop) -> bool,
+}
+
+/// Finds it.
+pub fn agree(nodes: usize, edges: &[GraphEdge], known: Evidence<'_>) -> Consensus {
+    let prior = known.prior;
+    let with = |lowered: f64| -> Vec<f64> {
+        let odds =
+            |(p, sight): (&f64, &f64)| if *p > 0.0 { of_logit(logit(*p) + sight + lowered) } else { 0.0 };
+        prior.iter().zip(known.sight).map(odds).collect()
+    };
+    let seen = with(0.0);
+    let short = known.loops;
+    let (mut lowered, mut all, mut posterior) = (0.0, Vec::new(), Vec::new());
+    for _ in 0..MOST_SHIFTS {
+        let now = with(lowered);
+        let first = beliefs(&now, short);
+        let unasked: Vec<bool> = confirmed(edges.len(), &first, short).iter().map(|c| !c).collect();
+        all = short.to_vec();
+        let mut long = ways_round(nodes, edges, &first, &unasked);
+        long.iter_mut()
+            .filter(|l| l.closes() == Some(true) && (known.implied)(l))
+            .for_each(EdgeLoop::silence);
+        all.extend(long);
+        posterior = beliefs(&now, &all);
+        let next = shift(prior, &posterior);
+        if (next - lowered).abs() < STILL {
+            break;
+        }
+        lowered = next;
+    }
+    let look_alike = lowered <= LOOK_ALIKE;
+    let may_join = joining(&posterior, known, &all, look_alike);
+    let joins = likelier_right_than_wrong(nodes, edges, &posterior, may_join, known.vouched);
     let likely: Vec<f64> = posterior.iter().zip(&joins).map(|(p, j)| if *j { *p } else { 0.0 }).collect();
     let mut poses = along_tree(nodes, edges, &likely);
     let weights: Vec<f64> = joins.iter().map(|j| f64::from(u8::from(*j))).collect();
@@ -95,9 +141,10 @@ pub fn agree(nodes: usize, edges: &[GraphEdge], prior: &[f64], abstains: &[bool]
     }
     let holds: Vec<bool> = verdicts.iter().map(|v| *v == EdgeVerdict::Holds).collect();
     settle(nodes, &mut poses, edges, &holds, &groups);
-    let rivals = rivals(&all, &verdicts, prior);
-    let holding = all.into_iter().filter(|l| l.edges.iter().all(|e| holds[*e])).collect();
-    Consensus { poses, components: groups, verdicts, posterior, loops: holding, rivals }
+    let rivals = rivals(&all, &verdicts, &seen);
+    let measured = |l: &EdgeLoop| l.chi_squared.is_finite() && l.edges.iter().all(|e| holds[*e]);
+    let holding = all.into_iter().filter(measured).collect();
+    Consensus { poses, components: groups, verdicts, posterior, loops: holding, rivals, look_alike }
 }
 
 /// The loops that close with two or more edges that contradict, each likely by its registration; the others hold or contradict too.
@@ -112,36 +159,59 @@ fn rivals(loops: &[EdgeLoop], verdicts: &[EdgeVerdict], prior: &[f64]) -> Vec<Ed
         .collect()
 }
 
-/// For each edge, whether a loop of likely edges closes with it, and whether one does not.
-fn heard(count: usize, likely: &[f64], loops: &[EdgeLoop]) -> Vec<(bool, bool)> {
-    let mut of = vec![(false, false); count];
-    for l in loops {
+/// For each edge, whether a loop of likely edges closes with it.
+fn confirmed(count: usize, likely: &[f64], loops: &[EdgeLoop]) -> Vec<bool> {
+    let mut of = vec![false; count];
+    for l in loops.iter().filter(|l| l.closes() == Some(true)) {
         for &edge in &l.edges {
-            let others_right = l.edges.iter().all(|e| *e == edge || likely[*e] >= HALF);
-            match l.closes() {
-                Some(true) if others_right => of[edge].0 = true,
-                Some(false) if others_right => of[edge].1 = true,
-                _ => {}
-            }
+            of[edge] |= l.edges.iter().all(|e| *e == edge || likely[*e] >= HALF);
         }
     }
     of
 }
 
 /// Which edges may join scans.
-fn joining(count: usize, posterior: &[f64], abstains: &[bool], loops: &[EdgeLoop]) -> Vec<bool> {
-    heard(count, posterior, loops)
+fn joining(posterior: &[f64], known: Evidence<'_>, loops: &[EdgeLoop], look_alike: bool) -> Vec<bool> {
+    confirmed(posterior.len(), posterior, loops)
         .into_iter()
         .enumerate()
-        .map(|(e, (supported, spoken_against))| {
-            let enough = if spoken_against && !supported { SURE } else { HALF };
-            posterior[e] >= enough && (supported || !abstains[e])
+        .map(|(e, confirmed)| match () {
+            () if confirmed => posterior[e] >= HALF,
+            () if known.abstains[e] => false,
+            () if known.vouched[e] => posterior[e] >= HALF,
+            () => posterior[e] >= SURE && !look_alike,
         })
         .collect()
 }
 
+/// Of the edges that may join, those by which the whole stays likelier right than wrong: along the likeliest tree the chances of an
+/// error may add up to a half. Edges that the user vouches for do not count. What is left out makes maps of its own.
+fn likelier_right_than_wrong(
+    nodes: usize,
+    edges: &[GraphEdge],
+    posterior: &[f64],
+    mut joins: Vec<bool>,
+    vouched: &[bool],
+) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..edges.len()).filter(|e| joins[*e]).collect();
+    order.sort_by(|a, b| posterior[*b].total_cmp(&posterior[*a]).then(a.cmp(b)));
+    let (mut union, mut risk) = (Union::new(nodes), 0.0);
+    for e in order {
+        let (a, b) = (union.find(edges[e].source), union.find(edges[e].target));
+        let more = if vouched[e] { 0.0 } else { 1.0 - posterior[e] };
+        if a != b && risk + more <= HALF {
+            risk += more;
+            union.join(a, b);
+        }
+    }
+    for (e, joins) in joins.iter_mut().enumerate() {
+        *joins &= union.find(edges[e].source) == union.find(edges[e].target);
+    }
+    joins
+}
+
 /// Poses by the likeliest edges, each tree from its lowest node.
-fn along_tree(nodes: usize, edges: &[GraphEdge], likely: &[f64]) -> Vec<Rigid> {
+pub fn along_tree(nodes: usize, edges: &[GraphEdge], likely: &[f64]) -> Vec<Rigid> {
     let tree = spanning_tree(nodes, edges, likely);
     let mut poses = vec![Rigid::identity(); nodes];
     for &node in &tree.order {
@@ -155,47 +225,6 @@ fn along_tree(nodes: usize, edges: &[GraphEdge], likely: &[f64]) -> Vec<Rigid> {
         }
     }
     poses
-}
-
-/// The optimum with a truncated quadratic loss by graduated non-convexity, and which edges are within the truncation. Source: Yang,
-/// Antonante, Tzoumas and Carlone, "Graduated non-convexity for robust spatial perception", 2020.
-fn truncated(nodes: usize, poses: &mut Vec<Rigid>, edges: &[GraphEdge], start: Vec<f64>) -> Vec<bool> {
-    let used: Vec<usize> = (0..edges.len()).filter(|e| start[*e] > 0.0).collect();
-    let mut weights = start;
-    let worst = |poses: &[Rigid]| used.iter().map(|e| edges[*e].cost(poses)).fold(0.0, f64::max);
-    let first = worst(poses);
-    let mut control = CLOSES / (2.0 * first - CLOSES);
-    if first > CLOSES && control > 0.0 {
-        for _ in 0..MOST_HARDENINGS {
-            let mut undecided = false;
-            for &e in &used {
-                let cost = edges[e].cost(poses);
-                weights[e] = if cost >= (control + 1.0) / control * CLOSES {
-                    0.0
-                } else if cost <= control / (control + 1.0) * CLOSES {
-                    1.0
-                } else {
-                    undecided = true;
-                    (CLOSES * control * (control + 1.0) / cost).sqrt() - control
-                };
-            }
-            move_to_optimum(nodes, poses, edges, &weights);
-            if !undecided {
-                break;
-            }
-            control *= HARDER;
-        }
-    } else {
-        move_to_optimum(nodes, poses, edges, &weights);
-    }
-    (0..edges.len()).map(|e| weights[e] > HALF && edges[e].cost(poses) <= CLOSES).collect()
-}
-
-fn move_to_optimum(nodes: usize, poses: &mut Vec<Rigid>, edges: &[GraphEdge], weights: &[f64]) {
-    let used: Vec<bool> = weights.iter().map(|w| *w > 1e-6).collect();
-    let held: Vec<usize> = components(nodes, edges, &used).iter().map(|g| g[0]).collect();
-    // Where there is no solution the poses stay where the tree put them.
-    let _ = optimise(poses, edges, weights, &held);
 }
 
 /// The optimum of the edges that hold, each component about its lowest node.
@@ -218,108 +247,4 @@ pub fn group_of(nodes: usize, groups: &[Vec<usize>]) -> Vec<usize> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::loops::tests::{exact, ring};
-    use crate::se3::{displacement, exp};
-
-    fn off(poses: &[Rigid], truth: &[Rigid]) -> f64 {
-        let aligned = |i: usize| truth[0].inverse().compose(&truth[i]).inverse().compose(&poses[i]);
-        (0..poses.len()).map(|i| displacement(&aligned(i), 1.0)).fold(0.0, f64::max)
-    }
-
-    /// A ring of 36 with each next and next but one, and wrong edges, 30 in a hundred, that look as good as the right ones.
-    #[test]
-    fn wrong_edges_are_found_and_named() {
-        let truth = ring(36);
-        let mut edges: Vec<GraphEdge> =
-            (0..36).flat_map(|i| [exact(&truth, i, (i + 1) % 36), exact(&truth, (i + 2) % 36, i)]).collect();
-        let right = edges.len();
-        for k in 0..31 {
-            let s = k as f64;
-            let mut wrong = exact(&truth, (7 * k) % 36, (7 * k + 11 + k % 5) % 36);
-            wrong.target_from_source = exp(&nalgebra::Vector6::new(
-                s.sin(),
-                (1.3 * s).cos(),
-                (2.1 * s).sin(),
-                s.cos(),
-                2.0,
-                -s.sin(),
-            ))
-            .compose(&wrong.target_from_source);
-            edges.push(wrong);
-        }
-        let prior = vec![0.95; edges.len()];
-        let found = agree(36, &edges, &prior, &vec![false; edges.len()]);
-        assert_eq!(found.components.len(), 1);
-        for (number, verdict) in found.verdicts.iter().enumerate() {
-            let expected = if number < right { EdgeVerdict::Holds } else { EdgeVerdict::Contradicts };
-            assert_eq!(*verdict, expected, "edge {number}");
-        }
-        assert!(off(&found.poses, &truth) < 1e-6, "{}", off(&found.poses, &truth));
-        assert!(found.rivals.is_empty(), "wrong edges agree with none: {:?}", found.rivals);
-    }
-
-    /// Node 4 is held by two nodes here, and by two others elsewhere.
-    #[test]
-    fn what_contradicts_and_agrees_with_itself_is_never_silent() {
-        let truth = ring(5);
-        let mut edges: Vec<GraphEdge> =
-            [(0, 1), (0, 2), (1, 2), (0, 3), (1, 3), (2, 3), (4, 2), (4, 3), (4, 0), (4, 1)]
-                .map(|(a, b)| exact(&truth, a, b))
-                .to_vec();
-        let mut other = truth.clone();
-        other[4] = exp(&nalgebra::Vector6::new(0.0, 0.0, 0.3, 5.0, 1.0, 0.0)).compose(&other[4]);
-        edges[8] = exact(&other, 4, 0);
-        edges[9] = exact(&other, 4, 1);
-        for sure in [[0.95, 0.95], [0.98, 0.9]] {
-            let mut prior = vec![0.95; 10];
-            prior[6..8].fill(sure[0]);
-            prior[8..].fill(sure[1]);
-            let found = agree(5, &edges, &prior, &[false; 10]);
-            assert!(found.components[0].len() == 4 || !found.rivals.is_empty(), "{found:?}");
-        }
-    }
-
-    #[test]
-    fn an_edge_that_abstains_joins_nothing_alone_and_with_a_loop_it_does() {
-        let truth = ring(6);
-        let mut edges: Vec<GraphEdge> =
-            [(0, 1), (1, 2), (0, 2), (3, 4), (4, 5), (3, 5)].map(|(a, b)| exact(&truth, a, b)).to_vec();
-        let sure = [0.95; 6];
-        edges.push(exact(&truth, 2, 3));
-        let abstains = |n: usize| [vec![false; 6], vec![true; n]].concat();
-        let found = agree(6, &edges, &[&sure[..], &[0.4]].concat(), &abstains(1));
-        assert_eq!(found.components, [vec![0, 1, 2], vec![3, 4, 5]]);
-        assert_eq!(found.verdicts[6], EdgeVerdict::Unconfirmed);
-        // A second one that agrees: each closes a loop for the other.
-        edges.push(exact(&truth, 1, 3));
-        let found = agree(6, &edges, &[&sure[..], &[0.4, 0.4]].concat(), &abstains(2));
-        assert_eq!(found.components.len(), 1);
-        assert!(found.verdicts.iter().all(|v| *v == EdgeVerdict::Holds) && off(&found.poses, &truth) < 1e-6);
-        // One that disagrees: neither.
-        edges[7].target_from_source.translation.x += 3.0;
-        let found = agree(6, &edges, &[&sure[..], &[0.4, 0.4]].concat(), &abstains(2));
-        assert_eq!(found.components.len(), 2);
-    }
-
-    #[test]
-    fn three_edges_of_which_one_is_wrong_join_nobody() {
-        let truth = ring(3);
-        let mut edges = [(0, 1), (1, 2), (2, 0)].map(|(a, b)| exact(&truth, a, b));
-        edges[1].target_from_source.translation.z += 5.0;
-        let found = agree(3, &edges, &[0.9; 3], &[false; 3]);
-        assert_eq!(found.components.len(), 3, "{found:?}");
-        // The same with one edge that is much less sure.
-        let found = agree(3, &edges, &[0.95, 0.55, 0.95], &[false; 3]);
-        assert_eq!(found.components.len(), 1, "{found:?}");
-        assert_eq!(found.verdicts[1], EdgeVerdict::Contradicts);
-    }
-
-    #[test]
-    fn nothing_measured_is_no_edge() {
-        let truth = ring(2);
-        let found = agree(2, &[exact(&truth, 0, 1)], &[0.0], &[true]);
-        assert_eq!((found.components.len(), found.verdicts[0]), (2, EdgeVerdict::Nothing));
-    }
-}
+mod tests;

@@ -38,6 +38,11 @@ impl EdgeLoop {
             _ => None,
         }
     }
+
+    /// Makes it say nothing.
+    pub fn silence(&mut self) {
+        self.chi_squared = f64::NAN;
+    }
 }
 
 /// Going along an edge from a node: the motion into the frame of the other end, and its covariance there.

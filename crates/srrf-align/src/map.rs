@@ -19,6 +19,8 @@ pub struct Map {
     /// Loops (numbers of their edges) of pairs that contradict the map, and agree with each other: places look alike, and the scans of that
     /// component abstain.
     pub rivals: Vec<Vec<usize>>,
+    /// Whether sure pairs turned out wrong so often that none joins scans by itself: places look alike, or registrations fail.
+    pub look_alike: bool,
     /// The loop of holding edges that closes worst; none without loops.
     pub worst_loop: Option<WorstLoop>,
     /// Root mean square distance of the matched points along the normals, over all scans; unit of the input. None without matches.

@@ -93,6 +93,7 @@ pub fn place(all: &Finished<'_>) -> Map {
         components: consensus.components.clone(),
         edges,
         rivals: consensus.rivals.iter().map(|l| l.edges.clone()).collect(),
+        look_alike: consensus.look_alike,
         worst_loop: worst_loop(surfaces, pool, consensus),
         residual,
         choice: choice.clone(),

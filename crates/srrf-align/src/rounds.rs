@@ -5,33 +5,34 @@ use std::time::Instant;
 
 use srrf_cloud::Rigid;
 
-use crate::consensus::{Consensus, EdgeVerdict, agree, group_of};
+use crate::consensus::{Consensus, EdgeVerdict, HALF, along_tree, group_of};
+use crate::graph::GraphEdge;
 use crate::likeness::{digests, likely_pairs};
+use crate::near::overlapping;
 use crate::options::{AlignError, AlignOptions, AlignProgress, AlignStage, PairReason};
 use crate::pair::{RegisterPairs, Scans};
-use crate::pool::{Candidate, PairPool, TriedPair, Workplace};
+use crate::pool::{Candidate, PairPool, Workplace};
 use crate::se3::shift;
+use crate::seen::consensus_of;
 use crate::surface::ScanSurface;
-use crate::trees::Union;
+use crate::trees::{Union, components};
 
 /// First guesses overlap from this share of the points on.
 const GUESSED_OVERLAP: f64 = 0.1;
 /// Loops are closed between scans that share this much in the map so far.
 const LOOP_OVERLAP: f64 = 0.25;
-/// Points of a scan that say whether two scans overlap.
-const OVERLAP_ASKED: usize = 150;
+/// ...and in one that is not confirmed.
+const MAYBE_OVERLAP: f64 = 0.15;
 /// Pairs of each scan in the first round, besides those of the spanning tree.
 const FIRST: usize = 3;
 const MOST_JOIN_ROUNDS: usize = 8;
 const LOOP_ROUNDS: usize = 2;
 /// Pairs that close loops, a scan and round.
 const LOOPS_PER_SCAN: usize = 2;
+/// A scan that so many agreeing pairs hold asks for no more loops.
+const HELD_WELL: usize = 3;
 /// Pairs less alike than this share of the median of those that hold are not tried to join components.
 const LIKENESS_FLOOR: f64 = 0.03;
-/// Scanners see through less than this of what is there: edges of things are thick.
-const SEEN_THROUGH: f64 = 0.002;
-/// Neighbours in the map of which overlap is computed.
-const NEIGHBOURS: usize = 40;
 
 /// A choice of pairs.
 pub struct Rounds<'a, 'b, S: Scans + ?Sized, R: RegisterPairs> {
@@ -107,6 +108,14 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
                 found = self.consensus();
             }
             for _ in 0..MOST_JOIN_ROUNDS {
+                // Where nothing joins without a loop, loops come first: they know where to look.
+                if found.look_alike {
+                    let closing = self.closing(&found);
+                    if !closing.is_empty() {
+                        self.try_pairs(PairReason::Loop, closing)?;
+                        found = self.consensus();
+                    }
+                }
                 let joining = self.joining(&alike, &found);
                 if joining.is_empty() {
                     break;
@@ -142,7 +151,7 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
 
     fn consensus(&self) -> Consensus {
         (self.place.progress)(AlignProgress { stage: AlignStage::Graph, done: 0, total: 1 });
-        consensus_of(self.surfaces().len(), &self.pool)
+        consensus_of(self.surfaces(), &self.pool)
     }
 
     fn candidate(&self, a: usize, b: usize, reason: PairReason) -> Candidate {
@@ -231,82 +240,42 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
         chosen
     }
 
-    /// Pairs that overlap in the map so far and were not tried, from the guess that it gives.
+    /// Pairs that overlap in the map so far and were not tried, from the guess that it gives; also in what the likely pairs would make
+    /// a map if a loop confirmed them.
     fn closing(&self, found: &Consensus) -> Vec<Candidate> {
-        let mut pairs = Vec::new();
-        for group in &found.components {
-            pairs.extend(overlapping(self.surfaces(), &found.poses, group, LOOP_OVERLAP));
+        let edges: Vec<GraphEdge> = self.pool.tried.iter().map(|t| t.edge.clone()).collect();
+        let likely: Vec<f64> = found.posterior.iter().map(|p| if *p >= HALF { *p } else { 0.0 }).collect();
+        let kept: Vec<bool> = likely.iter().map(|p| *p > 0.0).collect();
+        let n = self.surfaces().len();
+        let mut held = vec![0; n];
+        for (edge, verdict) in edges.iter().zip(&found.verdicts) {
+            let holds = usize::from(*verdict == EdgeVerdict::Holds);
+            held[edge.source] += holds;
+            held[edge.target] += holds;
         }
-        pairs.retain(|(a, b, _)| !self.pool.has(*a, *b));
+        let maybe = (components(n, &edges, &kept), along_tree(n, &edges, &likely), MAYBE_OVERLAP);
+        let sure = (found.components.clone(), found.poses.clone(), LOOP_OVERLAP);
+        let mut pairs: Vec<(usize, usize, f64, Rigid)> = Vec::new();
+        for (groups, poses, least) in [sure, maybe] {
+            for group in &groups {
+                for (a, b, share) in overlapping(self.surfaces(), &poses, group, least) {
+                    let asks = held[a] < HELD_WELL || held[b] < HELD_WELL;
+                    if asks && !self.pool.has(a, b) && pairs.iter().all(|p| (p.0, p.1) != (a, b)) {
+                        let input = |i: usize| poses[i].compose(&shift(&-self.surfaces()[i].centre));
+                        pairs.push((a, b, share, input(b).inverse().compose(&input(a))));
+                    }
+                }
+            }
+        }
         pairs.sort_by(|x, y| y.2.total_cmp(&x.2).then((x.0, x.1).cmp(&(y.0, y.1))));
-        limited(&pairs, LOOPS_PER_SCAN)
+        let shares: Vec<(usize, usize, f64)> = pairs.iter().map(|p| (p.0, p.1, p.2)).collect();
+        let chosen = limited(&shares, LOOPS_PER_SCAN);
+        pairs
             .into_iter()
-            .map(|(a, b)| {
-                let input = |i: usize| found.poses[i].compose(&shift(&-self.surfaces()[i].centre));
-                let guess = Some(input(b).inverse().compose(&input(a)));
-                Candidate { scans: (a, b), reason: PairReason::Loop, guess }
-            })
+            .filter(|p| chosen.contains(&(p.0, p.1)))
+            .map(|(a, b, _, guess)| Candidate { scans: (a, b), reason: PairReason::Loop, guess: Some(guess) })
             .collect()
     }
-}
-
-/// What the pairs so far agree on.
-pub fn consensus_of(scans: usize, pool: &PairPool) -> Consensus {
-    let edges: Vec<_> = pool.tried.iter().map(|t| t.edge.clone()).collect();
-    let prior = by_sight(pool);
-    let abstains: Vec<bool> = pool.tried.iter().map(|t| t.answer.abstain).collect();
-    agree(scans, &edges, &prior, &abstains)
-}
-
-/// The prior of each pair, less where scanners saw through what should be there: odds fall by the sixth power of the share over what right
-/// pairs have, twice the lowest tenth: of rooms that look alike most pairs may be wrong. Right pairs of real scans have up to 0.15 (things move, edges are thick).
-fn by_sight(pool: &PairPool) -> Vec<f64> {
-    let share = |t: &TriedPair| t.overlay.as_ref().and_then(|o| o.seen_through);
-    let mut all: Vec<f64> = pool.tried.iter().filter(|t| t.prior >= 0.5).filter_map(share).collect();
-    all.sort_by(f64::total_cmp);
-    let usual = all.get(all.len() / 10).map_or(SEEN_THROUGH, |tenth| (2.0 * tenth).max(SEEN_THROUGH));
-    pool.tried
-        .iter()
-        .map(|t| match share(t) {
-            Some(s) if s > usual => {
-                let odds = t.prior / (1.0 - t.prior).max(1e-9) * (usual / s).powi(6);
-                odds / (1.0 + odds)
-            }
-            _ => t.prior,
-        })
-        .collect()
-}
-
-/// The pairs of `members` that overlap by at least `least` in these poses of the centred scans: `(a, b, share)`, `a < b`.
-pub fn overlapping(
-    surfaces: &[ScanSurface],
-    poses: &[Rigid],
-    members: &[usize],
-    least: f64,
-) -> Vec<(usize, usize, f64)> {
-    use rayon::prelude::*;
-    let mut pairs: Vec<(usize, usize)> = Vec::new();
-    for &a in members {
-        let mut near: Vec<(f64, usize)> = members
-            .iter()
-            .filter(|b| **b != a)
-            .map(|&b| ((poses[a].translation - poses[b].translation).norm(), b))
-            .filter(|(apart, b)| *apart <= surfaces[a].reach + surfaces[*b].reach)
-            .collect();
-        near.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        near.truncate(NEIGHBOURS);
-        pairs.extend(near.into_iter().map(|(_, b)| (a.min(b), a.max(b))));
-    }
-    pairs.sort_unstable();
-    pairs.dedup();
-    pairs
-        .into_par_iter()
-        .map(|(a, b)| {
-            let b_from_a = poses[b].inverse().compose(&poses[a]);
-            (a, b, surfaces[b].overlap(&surfaces[a], &b_from_a, OVERLAP_ASKED))
-        })
-        .filter(|pair| pair.2 >= least)
-        .collect()
 }
 
 /// In this order, those of which one scan has fewer than `most` so far.

@@ -93,6 +93,11 @@ impl ScanSurface {
         Ok(Self { centre, radius, reach, spacing, index, normals, thin_spacing, sight })
     }
 
+    /// Whether the place of its scanner is known.
+    pub fn has_sight(&self) -> bool {
+        self.sight.is_some()
+    }
+
     /// The thinned points about the centre.
     pub fn points(&self) -> &[[f64; 3]] {
         self.index.points()
@@ -141,6 +146,18 @@ impl ScanSurface {
             }
         }
         (found, count)
+    }
+
+    /// For every n-th point of `source` whether it lies on this surface.
+    pub fn lies_on(&self, source: &Self, self_from_source: &Rigid, asked: usize) -> Vec<bool> {
+        let step = source.points().len().div_ceil(asked.max(1)).max(1);
+        let limit = self.near(source).powi(2);
+        source
+            .points()
+            .iter()
+            .step_by(step)
+            .map(|p| self.index.nearest(&self_from_source.apply(p)).1 <= limit)
+            .collect()
     }
 
     /// The larger of the two shares of points that lie on the other, by few points.

@@ -187,6 +187,55 @@ fn sure_and_wrong_pairs_are_found_and_named() {
     }
 }
 
+/// Pairs that somebody threw in.
+struct ThrownIn(BTreeMap<(usize, usize), PairAnswer>);
+
+impl PairStore for ThrownIn {
+    fn find(&self, source: usize, target: usize) -> Option<PairAnswer> {
+        self.0.get(&(source, target)).copied()
+    }
+
+    fn pairs(&self) -> Vec<(usize, usize)> {
+        self.0.keys().copied().collect()
+    }
+
+    fn keep(&self, _: usize, _: usize, _: &PairAnswer) {}
+}
+
+#[test]
+fn a_turntable_comes_together_though_three_in_ten_pairs_are_sure_and_wrong() {
+    let scene = Scene::new(&[(1, 36)], 36, 4);
+    let oracle = Oracle::new(&scene);
+    let without = run(&scene, &oracle, &AlignOptions::default());
+    let wanted = without.choice.tried * 3 / 7;
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let mut wrong = BTreeMap::new();
+    let known = |a: usize, b: usize| {
+        without.edges.iter().any(|e| (e.source, e.target) == (a, b) || (e.source, e.target) == (b, a))
+    };
+    while wrong.len() < wanted {
+        let (a, b) = (rng.random_range(0..36), rng.random_range(0..36));
+        if a < b && !known(a, b) {
+            let angles = std::array::from_fn(|_| rng.random_range(-3.0..3.0));
+            let off = anywhere(angles, std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
+            let pose = Some(scene.relative(a, b).compose(&off));
+            wrong.insert((a, b), PairAnswer { target_from_source: pose, probability: 0.95, abstain: false });
+        }
+    }
+    let map = align(&scene.scans[..], &oracle, &AlignOptions::default(), &ThrownIn(wrong.clone()), &|_| {})
+        .unwrap();
+    assert_eq!(map.components, [(0..36).collect::<Vec<_>>()]);
+    assert!(scene.worst_deg(&map, 0) < 0.1, "{}", scene.worst_deg(&map, 0));
+    let of_wrong = map.edges.iter().filter(|e| wrong.contains_key(&(e.source, e.target)));
+    let (mut asked, mut held) = (0, 0);
+    for edge in of_wrong {
+        asked += 1;
+        held += usize::from(edge.verdict == EdgeVerdict::Holds);
+    }
+    assert_eq!((asked, held), (wanted, 0));
+    assert!(map.scans.iter().all(|s| !s.abstain && s.probability > 0.9));
+}
+
 #[test]
 fn many_scans_try_few_pairs_and_the_answer_is_the_same_for_any_threads() {
     let scene = Scene::new(&[(1, 12), (3, 12)], 12, 11);

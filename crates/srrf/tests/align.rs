@@ -164,8 +164,93 @@ fn bad_use_says_what_to_do() {
     error(&["source.ply", "target.ply", "--max-memory", "0"], "a size of memory");
     error(&["source.ply", "target.ply", "--sequence", "--all-pairs"], "one of them");
     error(&["--add", "gone.json", "source.ply"], "should be what --output wrote");
+    scene.file("bare.csv", "a,b,c,d\n1,2,3,4\n2,3,4,5\n5,5,1,1\n9,1,1,3\n");
+    error(&["source.ply", "bare.csv"], "--columns");
+    let columns = scene.srrf(&["align", "bare.csv", "source.ply", "--columns", "b,c,d", "--initial", "gone"]);
+    assert!(columns.err.contains("gone") && !columns.err.contains("bare.csv"), "{columns:?}");
     scene.file("poses.txt", "1 2 3\n");
     error(&["source.ply", "target.ply", "--initial", "poses.txt"], "TUM has 8");
     scene.file("edges.jsonl", "hello\n");
     error(&["source.ply", "target.ply", "--edges", "edges.jsonl"], "line 1: not a registered pair");
+}
+
+/// A PTX file of three views of a shape, its poses a little off; the true poses. A point is as red as its number.
+fn project(scene: &Scene) -> Vec<Rigid> {
+    let shapes = ProceduralShapes::new(23, 6, None).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let dense = shapes.sample(1, 60_000, &mut rng).unwrap();
+    let (mut text, mut truth) = (String::new(), Vec::new());
+    for (i, eye) in turntable(8, 3.5, 1.3).into_iter().take(3).enumerate() {
+        let seen = seen_from(&dense, eye, 0.012).unwrap();
+        let turned = anywhere(std::array::from_fn(|_| rng.random_range(-3.0..3.0)), [0.0; 3]);
+        let file_from_scan = Rigid { translation: eye.into(), ..turned };
+        let points: Vec<[f64; 3]> = seen
+            .points()
+            .iter()
+            .filter(|_| rng.random_range(0.0..1.0) < 0.1)
+            .map(|p| file_from_scan.inverse().apply(p))
+            .collect();
+        let s = 0.02 * i as f64;
+        let written = anywhere([s, -s, s], [s, 0.0, -s]).compose(&file_from_scan).to_matrix4();
+        text += &format!("{}\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n", points.len());
+        for column in 0..4 {
+            let row: Vec<String> = (0..4).map(|r| written[(r, column)].to_string()).collect();
+            text += &(row.join(" ") + "\n");
+        }
+        for (n, p) in points.iter().enumerate() {
+            text += &format!("{} {} {} 0.5 {} {} 7\n", p[0], p[1], p[2], n % 256, i);
+        }
+        truth.push(file_from_scan);
+    }
+    scene.file("site.ptx", text);
+    truth
+}
+
+#[test]
+fn a_file_of_several_scans_is_taken_apart_and_its_copy_gets_better_poses() {
+    let scene = Scene::new(50);
+    let truth = project(&scene);
+    let done = scene.srrf(&["align", "site.ptx", "-o", "p.json", "--save", "m.ply", "--moved", "out"]);
+    assert_eq!(done.code, 0, "{done:?}");
+    assert!(done.out.contains("3 scans with a first guess by the poses in their file"), "{}", done.out);
+    let result: Value = serde_json::from_str(&scene.read("p.json")).unwrap();
+    assert_eq!(
+        (&result["scans"][1]["name"], &result["edges"][0]["reason"]),
+        (&"site.ptx#2".into(), &"guess".into())
+    );
+
+    // The copy holds the same points at poses that agree with the truth, where the original does not.
+    let poses = |name: &str| -> Vec<Rigid> {
+        let scans = CloudFile::open(&scene.path(name)).unwrap().scans().unwrap();
+        scans.iter().map(|s| s.pose.unwrap()).collect()
+    };
+    let (before, after) = (worst_deg(&poses("site.ptx"), &truth), worst_deg(&poses("out/site.ptx"), &truth));
+    assert!(before > 2.0 && after < 0.3, "{before} {after}");
+
+    // Colours and intensity come along: green is the number of the scan, red that of the point.
+    let merged = CloudFile::open(&scene.path("m.ply")).unwrap();
+    let attributes = merged.attributes().unwrap();
+    let value =
+        |name: &str, i: usize| attributes.iter().find(|a| a.name == name).unwrap().values.get(i).unwrap();
+    let scan = CloudFile::open(&scene.path("site.ptx#2")).unwrap().points().unwrap();
+    let pose = pose(&result["scans"][1]);
+    let points = merged.points().unwrap();
+    let (mut asked, mut right) = (0, 0);
+    for (i, p) in points.iter().enumerate().filter(|(i, _)| value("scan", *i) == 1.0) {
+        let number =
+            scan.iter().position(|q| (0..3).all(|c| (pose.apply(q)[c] - p[c]).abs() < 1e-9)).unwrap();
+        asked += 1;
+        right += usize::from(
+            value("red", i) == (number % 256) as f64
+                && value("green", i) == 1.0
+                && value("intensity", i) == 0.5,
+        );
+    }
+    assert!(asked > 100 && right == asked, "{right} of {asked}");
+
+    // Two files of one name would have one copy.
+    std::fs::create_dir(scene.path("other")).unwrap();
+    std::fs::copy(scene.path("site.ptx"), scene.path("other/site.ptx")).unwrap();
+    let done = scene.srrf(&["align", "site.ptx", "other/site.ptx", "--moved", "out"]);
+    assert!(done.code == 2 && done.err.contains("have the same name"), "{done:?}");
 }

@@ -9,19 +9,22 @@ use clap::Args;
 use srrf::{Options, Registrar};
 use srrf_align::{AlignError, AlignOptions, AlignProgress, AlignStage, Map};
 use srrf_args::flags::{Common, value};
-use srrf_args::numbers::bytes;
-use srrf_args::words::{count, counted, length};
-use srrf_args::{Failure, Output, OutputKind, Places, Progress, files, interrupt};
-use srrf_cloud::io::{ReadOptions, is_cloud_file};
+use srrf_args::reading::ReadFlags;
+use srrf_args::words::{count, counted};
+use srrf_args::{Failure, Output, OutputKind, OutputLock, Places, Progress, files, interrupt};
+use srrf_cloud::io::is_cloud_file;
 
 use super::align_edges::EdgeFile;
 use super::align_initial::{self, EarlierMap};
 use super::align_merge::{MergedCloudArgs, merge};
+use super::align_moved;
 use super::align_page;
 use super::align_poses;
-use super::align_scans::ScanFiles;
+use super::align_scans::{ScanFiles, ScanReading};
+use super::align_summary::{shortened, summary};
 use super::common::unusable;
 use super::method::MethodArgs;
+use super::surface::SurfaceArgs;
 
 /// The exit code of a map in which not every scan is placed.
 const ABSTAINED: u8 = 3;
@@ -60,6 +63,10 @@ pub struct AlignArgs {
     #[command(flatten)]
     merge: MergedCloudArgs,
 
+    /// Write a copy of each scan of the largest map into this folder, moved into its frame; E57 and PTX keep all and get new poses
+    #[arg(long, value_name = "FOLDER")]
+    moved: Option<PathBuf>,
+
     /// Write a page that shows the map, for any browser
     #[arg(long, value_name = value::FILE)]
     html: Option<PathBuf>,
@@ -84,13 +91,19 @@ pub struct AlignArgs {
     #[arg(long)]
     all_pairs: bool,
 
-    /// Memory to keep within, such as `4G`: scans that do not fit are read again when they are needed
-    #[arg(long, value_name = "SIZE", value_parser = bytes)]
-    max_memory: Option<u64>,
-
     /// Leave out the joint refinement on the points
     #[arg(long)]
     no_joint: bool,
+
+    /// Take no first guesses from the poses in files of several scans (E57, PTX)
+    #[arg(long)]
+    ignore_poses: bool,
+
+    #[command(flatten)]
+    read: ReadFlags,
+
+    #[command(flatten)]
+    surface: SurfaceArgs,
 
     #[command(flatten)]
     method: MethodArgs,
@@ -107,6 +120,7 @@ pub fn run(args: &AlignArgs) -> Result<ExitCode, Failure> {
     let begun = Instant::now();
     let out = args.check()?;
     args.common.threads.start()?;
+    let _locks = args.locks()?;
     let known = args.add.as_deref().map(align_initial::read_result).transpose()?;
     let progress = args.common.progress();
     progress.step("reading the scans, loading the network");
@@ -114,8 +128,16 @@ pub fn run(args: &AlignArgs) -> Result<ExitCode, Failure> {
     let initial = match (&args.initial, &known) {
         (Some(path), _) => align_initial::read_initial(path, &scans.names())?,
         (None, Some(known)) => known.guesses(scans.len()),
+        (None, None) if !args.ignore_poses && !args.sequence => scans.guesses(),
         (None, None) => Vec::new(),
     };
+    if args.initial.is_none() && args.add.is_none() && !initial.is_empty() {
+        let guessed = initial.iter().flatten().count();
+        out.say(&format!(
+            "{} with a first guess by the poses in their file; --ignore-poses takes none",
+            counted(guessed, "scan")
+        ));
+    }
     // All scans are in one unit; a small scan beside a large one is no sign of another.
     let registrar =
         Registrar::new(Options { check_scale: false, ..args.method.options() }).map_err(unusable)?;
@@ -181,15 +203,35 @@ impl AlignArgs {
             .writes("--kitti", self.kitti.as_deref(), OutputKind::KITTI)?
             .writes("--html", self.html.as_deref(), OutputKind::PAGE)?
             .writes("--edges", self.edges.as_deref(), OutputKind::JSON_LINES)?
+            .fills("--moved", self.moved.as_deref())
             .writes_cloud("--save", self.merge.save.as_deref())?;
         places.check()?;
         Ok(Output::new(self.common.quiet.quiet, places.takes_standard_output()))
     }
 
+    /// One process at a time writes each output.
+    fn locks(&self) -> Result<Vec<OutputLock>, Failure> {
+        let outputs = [&self.edges, &self.output, &self.merge.save, &self.html, &self.tum, &self.kitti];
+        outputs.into_iter().flatten().filter_map(|path| OutputLock::take(path).transpose()).collect()
+    }
+
     fn open(&self, known: Option<&EarlierMap>) -> Result<ScanFiles, Failure> {
         let before: Vec<PathBuf> = known.map_or_else(Vec::new, EarlierMap::paths);
-        let budget = self.max_memory.map(|bytes| bytes as f64);
-        ScanFiles::open(&before, &self.scans, budget, &ReadOptions::default())
+        let reading = ScanReading {
+            options: self.read.options(),
+            memory: self.read.max_memory,
+            vertices: self.surface.vertices,
+        };
+        let scans = ScanFiles::open(&before, &self.scans, &reading)?;
+        if let Some(folder) = &self.moved {
+            let mut places = Places::new();
+            for (name, file) in align_moved::names(&scans)? {
+                places =
+                    places.reads("a scan", &*file).writes_into("--moved", folder, &name.to_string_lossy());
+            }
+            places.check()?;
+        }
+        Ok(scans)
     }
 
     /// Writes what was asked for; says what was written.
@@ -211,13 +253,30 @@ impl AlignArgs {
             lines.push(wrote(path, "the poses of the largest map, as TUM"));
         }
         if let Some(path) = &self.merge.save {
-            let (points, of) = merge(map, scans, &self.merge, path)?;
-            let what = format!(
+            let merged = merge(map, scans, &self.merge, path)?;
+            let [points, of] = merged.points;
+            let [with, without] = &merged.attributes;
+            let mut what = format!(
                 "{} of {} points of the largest map, with the number of their scan",
                 count(points),
                 count(of)
             );
+            if !with.is_empty() {
+                what += &format!(" and {}", with.join(", "));
+            }
+            if !without.is_empty() {
+                what += &format!("; without {}, which not all its scans have", without.join(", "));
+            }
             lines.push(wrote(path, &what));
+        }
+        if let Some(folder) = &self.moved {
+            let copies = align_moved::write(map, scans, folder)?;
+            let mut what =
+                format!("{}, moved into the frame of the largest map", counted(copies.written, "file"));
+            if !copies.unmoved.is_empty() {
+                what += &format!("; not in it and not moved: {}", shortened(&copies.unmoved));
+            }
+            lines.push(wrote(folder, &what));
         }
         if let Some(path) = &self.html {
             files::write(path, align_page::page(map, scans)?.as_bytes())?;
@@ -282,93 +341,4 @@ impl<'a> Signs<'a> {
         self.progress.advance(now.done.saturating_sub(before));
         *last = Some(AlignProgress { done: now.done.max(before), ..now });
     }
-}
-
-/// The map in words and figures.
-fn summary(map: &Map, scans: &ScanFiles, seconds: f64) -> String {
-    let mut lines = Vec::new();
-    let mut line = |label: &str, text: String| lines.push(format!("{label:12} {text}"));
-    line("scans", counted(map.scans.len(), "scan"));
-    let several: Vec<_> = map.components.iter().filter(|c| c.len() > 1).collect();
-    let alone: Vec<String> =
-        map.components.iter().filter(|c| c.len() == 1).map(|c| scans.name(c[0])).collect();
-    let sizes: Vec<String> = several.iter().map(|c| count(c.len())).collect();
-    line(
-        "maps",
-        match several.len() {
-            0 => "none: nothing joins any two scans".into(),
-            1 => format!("one, of {} scans", sizes[0]),
-            n => {
-                format!("{n}, of {} scans; nothing is known of how they lie to each other", sizes.join(", "))
-            }
-        },
-    );
-    if !alone.is_empty() {
-        line("alone", format!("{}: {}", counted(alone.len(), "scan"), shortened(&alone)));
-    }
-    let doubtful: Vec<String> = (0..map.scans.len())
-        .filter(|i| map.scans[*i].abstain && map.components[map.scans[*i].component].len() > 1)
-        .map(|i| scans.name(i))
-        .collect();
-    if !doubtful.is_empty() {
-        line("abstain", format!("do not rely on {}", shortened(&doubtful)));
-    }
-    let c = &map.choice;
-    let rounds: Vec<String> =
-        c.rounds.iter().filter(|r| r.1 > 0).map(|(why, n)| format!("{n} {why}")).collect();
-    line("pairs", format!("{} of {} registered ({})", count(c.tried), count(c.possible), rounds.join(", ")));
-    let contradicting: Vec<String> = map
-        .edges
-        .iter()
-        .filter(|e| e.verdict == srrf_align::EdgeVerdict::Contradicts)
-        .map(|e| format!("{} to {}", scans.name(e.source), scans.name(e.target)))
-        .collect();
-    if !contradicting.is_empty() {
-        line(
-            "contradict",
-            format!("{} left out: {}", counted(contradicting.len(), "pair"), shortened(&contradicting)),
-        );
-    }
-    if !map.rivals.is_empty() {
-        line(
-            "alike",
-            format!(
-                "pairs that contradict the map agree with each other in {}: places look alike, and the scans of that map abstain; give --initial or --sequence",
-                counted(map.rivals.len(), "loop")
-            ),
-        );
-    }
-    if let Some(worst) = &map.worst_loop {
-        let scale = map.residual.unwrap_or(worst.displacement);
-        line(
-            "worst loop",
-            format!(
-                "{:.3}°, {}, of {}",
-                worst.angle_deg,
-                length(worst.displacement.max(scale * 1e-3), 3),
-                counted(worst.edges.len(), "pair")
-            ),
-        );
-    }
-    if let Some(residual) = map.residual {
-        line("residual", format!("{} between matched surfaces, root mean square", length(residual, 3)));
-    }
-    line("time", format!("{seconds:.1} s"));
-    if let Some((small, large, factor)) = scans.far_apart() {
-        line(
-            "warning",
-            format!("{large} is {factor:.0} times as large as {small}: are all scans in one unit?"),
-        );
-    }
-    lines.join("\n")
-}
-
-/// The first few of a list.
-fn shortened(names: &[String]) -> String {
-    const SHOWN: usize = 6;
-    let mut text = names.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");
-    if names.len() > SHOWN {
-        text += &format!(" and {} more", count(names.len() - SHOWN));
-    }
-    text
 }

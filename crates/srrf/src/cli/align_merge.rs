@@ -1,24 +1,27 @@
-//! The merged cloud of a map: thinned by voxels, with the number of the scan of each point.
+//! The merged cloud of a map: thinned by voxels, with the number of the scan of each point and what all scans have besides.
 
 use std::collections::HashMap;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use srrf_align::{Map, Scans};
 use srrf_args::Failure;
 use srrf_args::files;
+use srrf_cloud::io::{Attribute, AttributeValues, Outgoing, write_outgoing_to};
 use srrf_cloud::{PointCloud, point_spacing};
 
-use super::align_scans::ScanFiles;
+use super::align_gather::Gathered;
+use super::align_scans::{ScanAttributes, ScanFiles};
 
+/// The attribute that is the number of the scan.
+const SCAN: &str = "scan";
 /// Indices of voxels up to here are exact.
 const LARGEST_INDEX: f64 = 9.0e15;
 
 /// What to write of the merged cloud.
 #[derive(Debug, Clone, Args)]
 pub struct MergedCloudArgs {
-    /// Write the largest map as one cloud, PLY, with the number of the scan as the field `scan`
+    /// Write the largest map as one cloud, PLY, with the number of the scan as the field `scan`, and colours, intensities and others that all its scans have
     #[arg(long, value_name = "FILE")]
     pub save: Option<PathBuf>,
 
@@ -57,20 +60,26 @@ fn is_ply(path: &Path) -> bool {
 /// The point of a voxel that is nearest to its middle.
 struct VoxelPoint {
     scan: u32,
+    /// Its place in the scan.
+    index: usize,
     point: [f64; 3],
     squared: f64,
 }
 
-/// Writes the largest map to `path`. Answers how many points it has, and how many its scans had.
+/// What was written.
+#[derive(Debug)]
+pub struct Merged {
+    /// Points, and those of the scans.
+    pub points: [usize; 2],
+    /// Names of attributes that came along, and of those that not all scans have.
+    pub attributes: [Vec<String>; 2],
+}
+
+/// Writes the largest map to `path`, with what all its scans have besides: colours, intensities, normals.
 ///
 /// # Errors
 /// [`Failure`] for scans that cannot be read again, voxels far too small, and where it cannot be written.
-pub fn merge(
-    map: &Map,
-    scans: &ScanFiles,
-    args: &MergedCloudArgs,
-    path: &Path,
-) -> Result<(usize, usize), Failure> {
+pub fn merge(map: &Map, scans: &ScanFiles, args: &MergedCloudArgs, path: &Path) -> Result<Merged, Failure> {
     let members = &map.components[0];
     let size = match args.voxel {
         Some(size) => size,
@@ -82,19 +91,40 @@ pub fn merge(
         let cloud = scans.cloud(number)?;
         total += cloud.len();
         let pose = &map.scans[number].map_from_scan;
-        for p in cloud.points() {
-            keep(&mut voxels, number, pose.apply(p), size)?;
+        for (index, p) in cloud.points().iter().enumerate() {
+            keep(&mut voxels, (number, index), pose.apply(p), size)?;
         }
     }
     let mut kept: Vec<([i64; 3], VoxelPoint)> = voxels.into_iter().collect();
     kept.sort_unstable_by_key(|(key, k)| (k.scan, *key));
-    files::write(path, &ply(&kept))?;
-    Ok((kept.len(), total))
+    let mut gathered = Gathered::default();
+    for &number in members {
+        let places: Vec<usize> =
+            kept.iter().filter(|(_, k)| k.scan as usize == number).map(|(_, k)| k.index).collect();
+        let ScanAttributes { all, places: in_file } = scans.attributes(number)?;
+        let places: Vec<usize> = places.iter().filter_map(|i| in_file.get(*i).copied()).collect();
+        gathered.add(all, &places, &map.scans[number].map_from_scan);
+    }
+    let left_out = gathered.left_out;
+    let mut attributes = gathered.kept;
+    attributes.retain(|a| a.values.len() == kept.len());
+    let names = attributes.iter().map(|a| a.name.clone()).collect();
+    attributes.retain(|a| a.name != SCAN);
+    attributes.push(Attribute {
+        name: SCAN.into(),
+        values: AttributeValues::U32(kept.iter().map(|(_, k)| k.scan).collect()),
+    });
+    let points: Vec<[f64; 3]> = kept.iter().map(|(_, k)| k.point).collect();
+    let cloud = Outgoing { attributes: &attributes, extension: "ply", ..Outgoing::of_points(&points) };
+    let mut bytes = Vec::new();
+    write_outgoing_to(&mut bytes, "ply", &cloud)?;
+    files::write(path, &bytes)?;
+    Ok(Merged { points: [kept.len(), total], attributes: [names, left_out] })
 }
 
 fn keep(
     voxels: &mut HashMap<[i64; 3], VoxelPoint>,
-    number: usize,
+    (number, index): (usize, usize),
     point: [f64; 3],
     size: f64,
 ) -> Result<(), Failure> {
@@ -105,7 +135,7 @@ fn keep(
     }
     let key = point.map(|c| (c / size).floor() as i64);
     let squared = (0..3).map(|c| (point[c] - (key[c] as f64 + 0.5) * size).powi(2)).sum();
-    let next = VoxelPoint { scan: u32::try_from(number).unwrap_or(u32::MAX), point, squared };
+    let next = VoxelPoint { scan: u32::try_from(number).unwrap_or(u32::MAX), index, point, squared };
     match voxels.entry(key) {
         std::collections::hash_map::Entry::Vacant(free) => {
             free.insert(next);
@@ -132,22 +162,6 @@ fn spacing(members: &[usize], scans: &ScanFiles) -> Result<f64, Failure> {
     Ok(all.get(all.len() / 2).copied().filter(|s| *s > 0.0).unwrap_or(f64::MIN_POSITIVE.sqrt()))
 }
 
-fn ply(kept: &[([i64; 3], VoxelPoint)]) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(200 + 28 * kept.len());
-    // Writing to memory cannot fail.
-    let _ = write!(
-        bytes,
-        "ply\nformat binary_little_endian 1.0\ncomment merged by srrf align\nelement vertex {}\nproperty double x\n\
-         property double y\nproperty double z\nproperty uint scan\nend_header\n",
-        kept.len()
-    );
-    for (_, k) in kept {
-        k.point.iter().for_each(|c| bytes.extend(c.to_le_bytes()));
-        bytes.extend(k.scan.to_le_bytes());
-    }
-    bytes
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,10 +170,10 @@ mod tests {
     fn a_voxel_keeps_the_point_nearest_to_its_middle_and_its_scan() {
         let mut voxels = HashMap::new();
         for (scan, x) in [(0, 0.1), (1, 0.6), (2, 0.45), (3, 0.55), (4, -0.2)] {
-            keep(&mut voxels, scan, [x, 0.5, 0.5], 1.0).unwrap();
+            keep(&mut voxels, (scan, 7), [x, 0.5, 0.5], 1.0).unwrap();
         }
         assert_eq!((voxels.len(), voxels[&[0, 0, 0]].scan, voxels[&[-1, 0, 0]].scan), (2, 2, 4));
-        let error = keep(&mut voxels, 0, [1e9, 0.0, 0.0], 1e-12).unwrap_err().to_string();
+        let error = keep(&mut voxels, (0, 0), [1e9, 0.0, 0.0], 1e-12).unwrap_err().to_string();
         assert!(error.contains("--voxel") && error.contains("too small"), "{error}");
     }
 

@@ -51,6 +51,7 @@ pub fn to_json(map: &Map, scans: &ScanFiles, options: &str, seconds: f64) -> Val
             .filter(|(_, e)| e.verdict == srrf_align::EdgeVerdict::Contradicts)
             .map(|(i, _)| i).collect::<Vec<_>>(),
         "rivals": map.rivals,
+        "look_alike": map.look_alike,
         "worst_loop": map.worst_loop,
         "residual": map.residual,
         "pairs": {

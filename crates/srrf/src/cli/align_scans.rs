@@ -1,15 +1,19 @@
 //! The scans of an alignment: files and folders, kept in memory or read again.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
+use srrf::{Counterpart, SurfaceDraw};
 use srrf_align::Scans;
 use srrf_args::Failure;
 use srrf_args::files::{self, Input};
-use srrf_cloud::PointCloud;
-use srrf_cloud::io::{ReadOptions, is_cloud_file};
+use srrf_cloud::io::{Attribute, ReadOptions};
+use srrf_cloud::{PointCloud, Rigid, TriangleMesh};
+
+use super::align_places::{ScanPlace, apart, expanded};
 
 /// Bytes of a point in memory.
 const POINT: f64 = 24.0;
@@ -19,17 +23,31 @@ const READY: f64 = 60e6;
 /// Scans in two units differ by so much at least: a metre has 39 inches.
 const OTHER_UNIT: f64 = 25.0;
 
+/// How the points of all meshes are drawn.
+const SEED: u64 = 0;
+
+/// How scans are read.
+#[derive(Debug, Clone, Default)]
+pub struct ScanReading {
+    /// Of each file.
+    pub options: ReadOptions,
+    /// Bytes for all scans together: what does not fit is read again when it is needed.
+    pub memory: Option<u64>,
+    /// Whether meshes are their vertices.
+    pub vertices: bool,
+}
+
 /// Scans by number.
 #[derive(Debug)]
 pub struct ScanFiles {
-    options: ReadOptions,
+    reading: ScanReading,
     scans: Vec<OneScan>,
     budget: Option<f64>,
 }
 
 #[derive(Debug)]
 struct OneScan {
-    path: PathBuf,
+    place: ScanPlace,
     hash: String,
     points: usize,
     dropped: usize,
@@ -37,39 +55,40 @@ struct OneScan {
     size: f64,
     /// Where its scanner stood, where the file says it.
     viewpoint: Option<[f64; 3]>,
+    /// Whether its points were drawn from the surface of a mesh.
+    drawn: bool,
     /// None where it is read again each time.
     cloud: Option<PointCloud>,
 }
 
 impl ScanFiles {
-    /// Reads all scans once: those of an earlier result, then `given`, files and folders. Keeps them in memory as far as
-    /// half of the budget (bytes) allows.
+    /// Reads all scans once: those of an earlier result, then `given`, files and folders; each scan of a file that holds
+    /// several. Keeps them in memory as far as half of the memory that may be taken allows.
     ///
     /// # Errors
     /// [`Failure::usage`] for what cannot be read or used.
-    pub fn open(
-        before: &[PathBuf],
-        given: &[PathBuf],
-        budget: Option<f64>,
-        options: &ReadOptions,
-    ) -> Result<Self, Failure> {
-        let mut paths = before.to_vec();
+    pub fn open(before: &[PathBuf], given: &[PathBuf], reading: &ScanReading) -> Result<Self, Failure> {
+        let mut places: Vec<ScanPlace> = before.iter().map(|path| ScanPlace::of(path)).collect();
         for path in expanded(given)? {
-            if paths.contains(&path) {
-                return Err(Failure::usage(format!(
-                    "{path:?} is there twice; name each scan once{}",
-                    if before.contains(&path) { ", and only new ones with --add" } else { "" }
-                )));
+            for place in apart(path, &reading.options) {
+                if places.iter().any(|known| known.path == place.path) {
+                    return Err(Failure::usage(format!(
+                        "{:?} is there twice; name each scan once{}",
+                        place.path,
+                        if before.contains(&place.path) { ", and only new ones with --add" } else { "" }
+                    )));
+                }
+                places.push(place);
             }
-            paths.push(path);
         }
+        let budget = reading.memory.map(|bytes| bytes as f64);
         let keep_bytes = budget.map_or(f64::INFINITY, |b| 0.5 * b);
         let mut scans = Vec::new();
         let mut kept = 0.0;
         // A few at a time, so that those which are not kept are not in memory all at once.
-        for some in paths.chunks(rayon::current_num_threads().max(1)) {
+        for some in places.chunks(rayon::current_num_threads().max(1)) {
             let read: Vec<OneScan> =
-                some.par_iter().map(|path| read(path, options)).collect::<Result<_, _>>()?;
+                some.par_iter().map(|place| read(place, reading)).collect::<Result<_, _>>()?;
             for mut scan in read {
                 kept += POINT * scan.points as f64;
                 if kept > keep_bytes {
@@ -79,7 +98,56 @@ impl ScanFiles {
                 scans.push(scan);
             }
         }
-        Ok(Self { options: options.clone(), scans, budget })
+        Ok(Self { reading: reading.clone(), scans, budget })
+    }
+
+    /// How files are read.
+    pub fn options(&self) -> &ReadOptions {
+        &self.reading.options
+    }
+
+    /// The file of one, and its number in it where that holds several.
+    pub fn file(&self, number: usize) -> (&Path, Option<usize>) {
+        let (file, scan) = &self.scans[number].place.file;
+        (file, *scan)
+    }
+
+    /// First guesses by the poses in the files: the frame of the file that has most scans with poses. None where no file has
+    /// two that differ.
+    pub fn guesses(&self) -> Vec<Option<Rigid>> {
+        let mut of: BTreeMap<&Path, Vec<(usize, &Rigid)>> = BTreeMap::new();
+        for (number, scan) in self.scans.iter().enumerate() {
+            if let Some(pose) = &scan.place.pose {
+                of.entry(&scan.place.file.0).or_default().push((number, pose));
+            }
+        }
+        // A file whose scans were never registered has the same pose everywhere.
+        of.retain(|_, scans| scans.iter().any(|(_, pose)| *pose != scans[0].1));
+        let best = of.values().rev().max_by_key(|scans| scans.len());
+        let mut guesses = Vec::new();
+        if let Some(best) = best {
+            guesses.resize(self.len(), None);
+            // Their points are read where the poses put them.
+            best.iter().for_each(|(number, _)| guesses[*number] = Some(Rigid::identity()));
+        }
+        guesses
+    }
+
+    /// What the points of one have besides their place; nothing for a drawn surface.
+    ///
+    /// # Errors
+    /// [`Failure::usage`] where the file cannot be read again.
+    pub fn attributes(&self, number: usize) -> Result<ScanAttributes, Failure> {
+        let scan = &self.scans[number];
+        if scan.drawn {
+            return Ok(ScanAttributes { all: Vec::new(), places: Vec::new() });
+        }
+        let input = files::read(&scan.place.path, None, self.reading.options.clone())?;
+        let places = match &input.kept {
+            Some(kept) => (0..kept.len()).filter(|i| kept[*i]).collect(),
+            None => (0..input.cloud.len()).collect(),
+        };
+        Ok(ScanAttributes { all: input.file.attributes()?, places })
     }
 
     /// How many there are.
@@ -89,7 +157,7 @@ impl ScanFiles {
 
     /// The path of one, as given.
     pub fn name(&self, number: usize) -> String {
-        self.scans[number].path.display().to_string()
+        self.scans[number].place.path.display().to_string()
     }
 
     /// All paths.
@@ -112,7 +180,7 @@ impl ScanFiles {
         let order = |a: &&OneScan, b: &&OneScan| a.size.total_cmp(&b.size);
         let (small, large) = (self.scans.iter().min_by(order)?, self.scans.iter().max_by(order)?);
         let factor = large.size / small.size;
-        let name = |scan: &OneScan| scan.path.display().to_string();
+        let name = |scan: &OneScan| scan.place.path.display().to_string();
         (factor > OTHER_UNIT).then(|| (name(small), name(large), factor))
     }
 
@@ -140,38 +208,69 @@ impl Scans for ScanFiles {
         match &self.scans[number].cloud {
             Some(cloud) => Ok(Cow::Borrowed(cloud)),
             None => {
-                let again = read(&self.scans[number].path, &self.options)?;
+                let again = read(&self.scans[number].place, &self.reading)?;
                 if again.hash != self.scans[number].hash {
                     return Err(Failure::usage(format!(
                         "{:?} has changed since it was read first; start again when nobody writes it",
-                        self.scans[number].path
+                        self.scans[number].place.path
                     )));
                 }
                 match again.cloud {
                     Some(cloud) => Ok(Cow::Owned(cloud)),
-                    None => {
-                        Err(Failure::failed(format!("{:?}: its points are gone", self.scans[number].path)))
-                    }
+                    None => Err(Failure::failed(format!(
+                        "{:?}: its points are gone",
+                        self.scans[number].place.path
+                    ))),
                 }
             }
         }
     }
 }
 
-fn read(path: &Path, options: &ReadOptions) -> Result<OneScan, Failure> {
-    let Input { cloud, dropped, viewpoint, .. } = files::read_solid(path, None, options.clone())?;
+/// Attributes of a file.
+#[derive(Debug)]
+pub struct ScanAttributes {
+    /// One value for each point of the file.
+    pub all: Vec<Attribute>,
+    /// For each point of the cloud its place in the file.
+    pub places: Vec<usize>,
+}
+
+fn read(place: &ScanPlace, reading: &ScanReading) -> Result<OneScan, Failure> {
+    let input = files::read_solid(&place.path, None, reading.options.clone())?;
+    let Input { mut cloud, dropped, viewpoint, faces, name, .. } = input;
+    let drawn = if faces.is_empty() || reading.vertices { None } else { drawn(&cloud, &faces, &name)? };
+    let is_drawn = drawn.is_some();
+    if let Some(drawn) = drawn {
+        cloud = drawn;
+    }
     let middle = cloud.middle();
     let size =
         cloud.points().iter().map(|p| (nalgebra::Vector3::from(*p) - middle).norm()).fold(0.0, f64::max);
     let hash = hash_of(&cloud);
     Ok(OneScan {
-        path: path.to_owned(),
+        place: place.clone(),
         hash,
         points: cloud.len(),
         dropped,
         size,
         viewpoint,
+        drawn: is_drawn,
         cloud: Some(cloud),
+    })
+}
+
+/// Points of the surface of a mesh, where its vertices do not lie dense enough.
+fn drawn(cloud: &PointCloud, faces: &[[u32; 3]], name: &str) -> Result<Option<PointCloud>, Failure> {
+    let mesh = TriangleMesh::new(cloud.points(), faces).map_err(|e| {
+        Failure::usage(format!(
+            "{name:?}: {e}; mend the mesh, or take its vertices as a cloud with --vertices"
+        ))
+        .because(e)
+    })?;
+    Ok(match SurfaceDraw::for_counterpart(&mesh, cloud.len(), Counterpart::Surface(&mesh)) {
+        SurfaceDraw::Vertices => None,
+        SurfaceDraw::Surface { points, .. } => Some(mesh.sample(points, SEED)),
     })
 }
 
@@ -184,44 +283,14 @@ fn hash_of(cloud: &PointCloud) -> String {
     hash.finalize().iter().take(16).map(|b| format!("{b:02x}")).collect()
 }
 
-/// The files of folders, by name; files as they are.
-fn expanded(given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    let mut paths = Vec::new();
-    for path in given {
-        if files::is_stream(path) {
-            return Err(Failure::usage("a scan is `-`: the scans of a map are files; name them".into()));
-        }
-        if !path.is_dir() {
-            paths.push(path.clone());
-            continue;
-        }
-        let unreadable = |e| Failure::usage(format!("cannot read the folder {path:?}: {e}"));
-        let mut inside = Vec::new();
-        for entry in std::fs::read_dir(path).map_err(unreadable)? {
-            let entry = entry.map_err(unreadable)?.path();
-            if entry.is_file() && is_cloud_file(&entry) {
-                inside.push(entry);
-            }
-        }
-        if inside.is_empty() {
-            return Err(Failure::usage(format!(
-                "the folder {path:?} holds no file whose extension names a format of clouds; name the files, or another folder"
-            )));
-        }
-        inside.sort();
-        paths.extend(inside);
-    }
-    Ok(paths)
-}
-
 #[cfg(test)]
 mod tests {
     use srrf_cloud::io::write_cloud;
 
     use super::*;
 
-    fn open(given: &[PathBuf], budget: Option<f64>) -> Result<ScanFiles, Failure> {
-        ScanFiles::open(&[], given, budget, &ReadOptions::default())
+    fn open(given: &[PathBuf], budget: Option<u64>) -> Result<ScanFiles, Failure> {
+        ScanFiles::open(&[], given, &ScanReading { memory: budget, ..ScanReading::default() })
     }
 
     fn cloud(n: usize) -> PointCloud {
@@ -266,7 +335,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.ply");
         write_cloud(&path, &cloud(9)).unwrap();
-        let scans = open(std::slice::from_ref(&path), Some(100.0)).unwrap();
+        let scans = open(std::slice::from_ref(&path), Some(100)).unwrap();
         assert!(scans.scans[0].cloud.is_none() && scans.at_once(8) == 1);
         assert_eq!(scans.cloud(0).unwrap().len(), 9);
         write_cloud(&path, &cloud(10)).unwrap();

@@ -10,11 +10,15 @@ use srrf_corrupt::cli::{CorruptArgs, corrupt};
 
 mod align;
 mod align_edges;
+mod align_gather;
 mod align_initial;
 mod align_merge;
+mod align_moved;
 mod align_page;
+mod align_places;
 mod align_poses;
 mod align_scans;
+mod align_summary;
 mod batch;
 mod common;
 mod inspect;

@@ -1,0 +1,98 @@
+//! What registered pairs agree on once what the scanners saw through is held against it.
+
+use rayon::prelude::*;
+use srrf_cloud::Rigid;
+
+use crate::consensus::{Consensus, EdgeVerdict, Evidence, agree};
+use crate::graph::GraphEdge;
+use crate::implied::is_implied;
+use crate::loops::{EdgeLoop, triangles};
+use crate::near::close_by;
+use crate::options::PairReason;
+use crate::pool::PairPool;
+use crate::surface::ScanSurface;
+use crate::trees::spanning_tree;
+use crate::trust::Sight;
+
+/// A pair that is so much likelier wrong by sight (log odds) says that the way between its scans is wrong.
+const BLOCKS: f64 = -5.0;
+/// Longer ways say little about their edges.
+const LONGEST_WAY: usize = 10;
+/// So many times a map is mended by what scanners saw.
+const SIGHT_ROUNDS: usize = 8;
+
+/// What the pairs so far agree on, and what scanners saw of it.
+pub fn consensus_of(surfaces: &[ScanSurface], pool: &PairPool) -> Consensus {
+    let edges: Vec<_> = pool.tried.iter().map(|t| t.edge.clone()).collect();
+    let prior: Vec<f64> = pool.tried.iter().map(|t| t.prior).collect();
+    let abstains: Vec<bool> = pool.tried.iter().map(|t| t.answer.abstain).collect();
+    let vouched: Vec<bool> =
+        pool.tried.iter().map(|t| matches!(t.reason, PairReason::Sequence | PairReason::Guess)).collect();
+    let share: Vec<Option<f64>> =
+        pool.tried.iter().map(|t| t.overlay.as_ref().and_then(|o| o.seen_through)).collect();
+    let sight = Sight::learned(&prior, &share);
+    let by_sight: Vec<f64> = share.iter().map(|s| s.map_or(0.0, |s| sight.log_ratio(s))).collect();
+    let mut loops = triangles(surfaces.len(), &edges, &prior);
+    loops.par_iter_mut().filter(|l| l.closes() == Some(true)).for_each(|l| {
+        if is_implied(surfaces, &edges, l) {
+            l.silence();
+        }
+    });
+    let mut round = 0;
+    loop {
+        let known = Evidence {
+            prior: &prior,
+            sight: &by_sight,
+            abstains: &abstains,
+            vouched: &vouched,
+            loops: &loops,
+            implied: &|l| is_implied(surfaces, &edges, l),
+        };
+        let mut found = agree(surfaces.len(), &edges, known);
+        let mut more = seen_through(surfaces, &edges, &found, sight);
+        more.retain(|l| loops.iter().all(|b| b.edges != l.edges));
+        if more.is_empty() {
+            return found;
+        }
+        if round == SIGHT_ROUNDS {
+            // Whatever is still seen through leaves its map in doubt.
+            found.rivals.extend(more);
+            return found;
+        }
+        loops.extend(more);
+        round += 1;
+    }
+}
+
+/// The ways along the map between scans of which one saw through the other: something on them is wrong.
+fn seen_through(
+    surfaces: &[ScanSurface],
+    edges: &[GraphEdge],
+    found: &Consensus,
+    sight: Sight,
+) -> Vec<EdgeLoop> {
+    if surfaces.iter().all(|s| !s.has_sight()) {
+        return Vec::new();
+    }
+    let likely: Vec<f64> = (0..edges.len())
+        .map(|e| if found.verdicts[e] == EdgeVerdict::Holds { found.posterior[e] } else { 0.0 })
+        .collect();
+    let tree = spanning_tree(surfaces.len(), edges, &likely);
+    let mut pairs = Vec::new();
+    for group in found.components.iter().filter(|g| g.len() > 2) {
+        pairs.extend(close_by(surfaces, &found.poses, group));
+    }
+    pairs
+        .into_par_iter()
+        .filter_map(|(a, b)| {
+            let way = tree.way(a, b).filter(|way| (2..=LONGEST_WAY).contains(&way.len()))?;
+            let b_from_a = found.poses[b].inverse().compose(&found.poses[a]);
+            let share = surfaces[b].seen_through(&surfaces[a], &b_from_a)?;
+            (sight.log_ratio(share) < BLOCKS).then(|| EdgeLoop {
+                edges: way,
+                error: Rigid::identity(),
+                chi_squared: f64::INFINITY,
+            })
+        })
+        .collect()
+}
