@@ -166,8 +166,9 @@ fn bad_use_says_what_to_do() {
     error(&["--add", "gone.json", "source.ply"], "should be what --output wrote");
     scene.file("bare.csv", "a,b,c,d\n1,2,3,4\n2,3,4,5\n5,5,1,1\n9,1,1,3\n");
     error(&["source.ply", "bare.csv"], "--columns");
-    let columns = scene.srrf(&["align", "bare.csv", "source.ply", "--columns", "b,c,d", "--initial", "gone"]);
-    assert!(columns.err.contains("gone") && !columns.err.contains("bare.csv"), "{columns:?}");
+    scene.file("also.csv", "a,b,c,d\n1,2,3,9\n2,7,4,5\n5,5,1,1\n9,1,1,3\n");
+    let columns = scene.srrf(&["align", "bare.csv", "also.csv", "--columns", "b,c,d", "--initial", "gone"]);
+    assert!(columns.err.contains("gone") && !columns.err.contains(".csv"), "{columns:?}");
     scene.file("poses.txt", "1 2 3\n");
     error(&["source.ply", "target.ply", "--initial", "poses.txt"], "TUM has 8");
     scene.file("edges.jsonl", "hello\n");
