@@ -112,7 +112,7 @@ mod tests {
         let street = [Some(0.004), Some(0.006), Some(0.005), Some(0.003), Some(0.008), Some(0.09)];
         let sight = Sight::learned(&[0.95; 6], &street);
         assert!(
-            sight.usual > 0.003 && sight.log_ratio(0.006) > 0.0 && sight.log_ratio(0.09) < -3.0,
+            sight.usual > 0.0015 && sight.log_ratio(0.004) > 0.0 && sight.log_ratio(0.09) < -3.0,
             "{sight:?}"
         );
         // Where all pairs see through each other, none is made usual.
