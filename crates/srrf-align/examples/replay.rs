@@ -6,6 +6,8 @@
 //! `srrf align FOLDER --edges FOLDER.jsonl` keeps them. A pair that is not there counts as one without a pose. Each map is held
 //! against the truth by the scan by which most are right. `--edges` lists each pair that says something.
 
+#![allow(clippy::print_stdout, reason = "an example that prints its figures")]
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::convert::Infallible;
