@@ -74,7 +74,7 @@ pub struct Consensus {
 
 /// What is known of the edges, one value an edge.
 #[derive(Clone, Copy)]
-pub struct Evidence<'a> {
+pub struct EdgeEvidence<'a> {
     /// Probability by the registration; 0 where nothing was measured.
     pub prior: &'a [f64],
     /// What else speaks for it, in log odds.
@@ -90,7 +90,7 @@ pub struct Evidence<'a> {
 }
 
 /// Finds it.
-pub fn agree(nodes: usize, edges: &[GraphEdge], known: Evidence<'_>) -> Consensus {
+pub fn agree(nodes: usize, edges: &[GraphEdge], known: EdgeEvidence<'_>) -> Consensus {
     let prior = known.prior;
     let with = |lowered: f64| -> Vec<f64> {
         let odds =
@@ -171,7 +171,7 @@ fn confirmed(count: usize, likely: &[f64], loops: &[EdgeLoop]) -> Vec<bool> {
 }
 
 /// Which edges may join scans.
-fn joining(posterior: &[f64], known: Evidence<'_>, loops: &[EdgeLoop], look_alike: bool) -> Vec<bool> {
+fn joining(posterior: &[f64], known: EdgeEvidence<'_>, loops: &[EdgeLoop], look_alike: bool) -> Vec<bool> {
     confirmed(posterior.len(), posterior, loops)
         .into_iter()
         .enumerate()

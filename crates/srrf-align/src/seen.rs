@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use srrf_cloud::Rigid;
 
-use crate::consensus::{Consensus, EdgeVerdict, Evidence, agree};
+use crate::consensus::{Consensus, EdgeEvidence, EdgeVerdict, agree};
 use crate::graph::GraphEdge;
 use crate::implied::is_implied;
 use crate::loops::{EdgeLoop, triangles};
@@ -40,7 +40,7 @@ pub fn consensus_of(surfaces: &[ScanSurface], pool: &PairPool) -> Consensus {
     });
     let mut round = 0;
     loop {
-        let known = Evidence {
+        let known = EdgeEvidence {
             prior: &prior,
             sight: &by_sight,
             abstains: &abstains,

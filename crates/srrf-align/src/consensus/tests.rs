@@ -12,7 +12,14 @@ fn agreed(nodes: usize, edges: &[GraphEdge], prior: &[f64], abstains: &[bool]) -
     agree(
         nodes,
         edges,
-        Evidence { prior, sight: &sight, abstains, vouched: &vouched, loops: &loops, implied: &|_| false },
+        EdgeEvidence {
+            prior,
+            sight: &sight,
+            abstains,
+            vouched: &vouched,
+            loops: &loops,
+            implied: &|_| false,
+        },
     )
 }
 
@@ -114,7 +121,7 @@ fn a_map_is_one_as_long_as_it_is_likelier_right_than_wrong() {
     assert_eq!(found.verdicts[0], EdgeVerdict::Unconfirmed);
     let (sight, none) = ([0.0; 8], [false; 8]);
     let vouched = [true; 8];
-    let known = Evidence {
+    let known = EdgeEvidence {
         prior: &prior,
         sight: &sight,
         abstains: &none,
@@ -138,7 +145,7 @@ fn what_scanners_saw_breaks_a_map() {
         .to_vec();
     let mut loops = triangles(6, &edges, &prior);
     loops.extend(blocked);
-    let known = Evidence {
+    let known = EdgeEvidence {
         prior: &prior,
         sight: &[0.0; 7],
         abstains: &[false; 7],

@@ -10,7 +10,7 @@ use super::scans;
 
 /// Where a scan is.
 #[derive(Debug, Clone)]
-pub struct ScanPlace {
+pub struct ScanFile {
     /// As given; `FILE#2` for the second scan of a file.
     pub path: PathBuf,
     /// The file, and the number of the scan in it, where it holds several.
@@ -19,7 +19,7 @@ pub struct ScanPlace {
     pub pose: Option<Rigid>,
 }
 
-impl ScanPlace {
+impl ScanFile {
     /// A whole file, or `FILE#2`.
     pub fn of(path: &Path) -> Self {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -33,8 +33,8 @@ impl ScanPlace {
 }
 
 /// A file of several scans as each of them.
-pub fn apart(path: PathBuf, options: &ReadOptions) -> Vec<ScanPlace> {
-    let whole = ScanPlace::of(&path);
+pub fn apart(path: PathBuf, options: &ReadOptions) -> Vec<ScanFile> {
+    let whole = ScanFile::of(&path);
     if whole.file.1.is_some() {
         return vec![whole];
     }
@@ -44,7 +44,7 @@ pub fn apart(path: PathBuf, options: &ReadOptions) -> Vec<ScanPlace> {
             .map(|(number, entry)| {
                 let mut name = path.file_name().unwrap_or_default().to_owned();
                 name.push(format!("#{number}"));
-                ScanPlace {
+                ScanFile {
                     path: path.with_file_name(name),
                     file: (path.clone(), Some(number)),
                     pose: entry.pose,

@@ -13,7 +13,7 @@ use srrf_args::files::{self, Input};
 use srrf_cloud::io::{Attribute, ReadOptions};
 use srrf_cloud::{PointCloud, Rigid, TriangleMesh};
 
-use super::align_places::{ScanPlace, apart, expanded};
+use super::align_places::{ScanFile, apart, expanded};
 
 /// Bytes of a point in memory.
 const POINT: f64 = 24.0;
@@ -47,7 +47,7 @@ pub struct ScanFiles {
 
 #[derive(Debug)]
 struct OneScan {
-    place: ScanPlace,
+    place: ScanFile,
     hash: String,
     points: usize,
     dropped: usize,
@@ -68,7 +68,7 @@ impl ScanFiles {
     /// # Errors
     /// [`Failure::usage`] for what cannot be read or used.
     pub fn open(before: &[PathBuf], given: &[PathBuf], reading: &ScanReading) -> Result<Self, Failure> {
-        let mut places: Vec<ScanPlace> = before.iter().map(|path| ScanPlace::of(path)).collect();
+        let mut places: Vec<ScanFile> = before.iter().map(|path| ScanFile::of(path)).collect();
         for path in expanded(given)? {
             for place in apart(path, &reading.options) {
                 if places.iter().any(|known| known.path == place.path) {
@@ -236,7 +236,7 @@ pub struct ScanAttributes {
     pub places: Vec<usize>,
 }
 
-fn read(place: &ScanPlace, reading: &ScanReading) -> Result<OneScan, Failure> {
+fn read(place: &ScanFile, reading: &ScanReading) -> Result<OneScan, Failure> {
     let input = files::read_solid(&place.path, None, reading.options.clone())?;
     let Input { mut cloud, dropped, viewpoint, faces, name, .. } = input;
     let drawn = if faces.is_empty() || reading.vertices { None } else { drawn(&cloud, &faces, &name)? };
