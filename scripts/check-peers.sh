@@ -22,3 +22,7 @@ fi
 cargo build -q -p srrf-cloud --example convert
 convert=$(cargo metadata --format-version 1 --no-deps | "$venv/bin/python" -c 'import json, sys; print(json.load(sys.stdin)["target_directory"])')/debug/examples/convert
 "$venv/bin/python" scripts/check_peers.py "$convert" "$@"
+
+# Files as people and cameras write them, by the program itself.
+cargo build -q -p srrf
+"$venv/bin/python" scripts/make_corpus.py "$(mktemp -d)" --check "${convert%/examples/convert}/srrf"

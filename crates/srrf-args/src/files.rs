@@ -170,6 +170,23 @@ pub fn write_points(path: &Path, cloud: &PointCloud, original: &Input) -> Result
     }?)
 }
 
+/// Writes the points of a file that are read as a cloud, or the vertices of a mesh, multiplied by `factor` and then moved;
+/// to a stream as PLY.
+///
+/// # Errors
+/// [`Failure`], which names the file.
+pub fn write_scaled(path: &Path, input: &Input, factor: f64, pose: &Rigid) -> Result<Kept, Failure> {
+    let all = input.file.points()?;
+    let is_kept = |index: usize| input.kept.as_ref().is_none_or(|kept| kept.get(index) == Some(&true));
+    let kept =
+        all.into_iter().enumerate().filter(|(index, _)| is_kept(*index)).map(|(_, point)| point).collect();
+    let moved = PointCloud::new(kept)
+        .and_then(|cloud| cloud.scaled(factor))
+        .map_err(|error| Failure::cloud(&input.name, &error))?
+        .transformed(pose);
+    write_points(path, &moved, input)
+}
+
 /// Writes a moved copy of a file; to a stream in its own format.
 ///
 /// # Errors

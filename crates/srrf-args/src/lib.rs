@@ -18,6 +18,7 @@ mod program;
 mod progress;
 pub mod reading;
 mod scripts;
+pub mod surface;
 pub mod words;
 
 pub use exit::{ABSTAINED, EXIT_CODES, FAILED, INTERRUPTED, USAGE};

@@ -30,7 +30,7 @@ pub use cloud::{CloudError, PointCloud, UnitSphere};
 pub use euler::EulerXyz;
 pub use fps::farthest_point_sampling;
 pub use frame::PairFrame;
-pub use mesh::{LEAST_SAMPLES, MOST_SAMPLES, MeshError, TriangleMesh};
+pub use mesh::{FEWEST_SCANNED, LEAST_SAMPLES, MOST_SAMPLES, MeshError, TriangleMesh};
 pub use neighbours::KnnIndex;
 pub use normals::estimate_normals;
 pub use register::{

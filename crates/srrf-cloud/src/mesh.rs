@@ -11,6 +11,9 @@ pub const LEAST_SAMPLES: usize = 20_000;
 /// Points drawn from a surface at most, however fine the other cloud is.
 pub const MOST_SAMPLES: usize = 300_000;
 
+/// A mesh of fewer vertices than this is drawn by hand or by a program, not scanned: its vertices are no cloud.
+pub const FEWEST_SCANNED: usize = 2_000;
+
 /// Median distance to the nearest other of points strewn at random over a surface, where each has a unit of area: in the plane
 /// the distance r has the distribution 1 - exp(-pi r^2), whose median is sqrt(ln 2 / pi).
 const SPACING_OF_UNIT_DENSITY: f64 = 0.469_718_639_319_144_4;

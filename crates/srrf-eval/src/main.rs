@@ -50,7 +50,7 @@ fn run(options: &EvalOptions) -> Result<(), EvalError> {
     let transforms = options
         .transforms
         .iter()
-        .map(|path| Transforms::read(path, pairs.groups()))
+        .map(|path| Transforms::read(path, pairs.groups(), &options.reading()))
         .collect::<Result<Vec<_>, _>>()?;
     set.add_transforms(&transforms)?;
     if !pairs.has_oracle() {
@@ -140,7 +140,7 @@ fn make_tables(options: &TablesOptions) -> Result<(), EvalError> {
 /// The pairs of a file, or pairs made from shapes.
 fn open_pairs(options: &EvalOptions) -> Result<Box<dyn PairSource>, EvalError> {
     if let Some(path) = &options.pairs {
-        return Ok(Box::new(PairFile::read(path)?));
+        return Ok(Box::new(PairFile::read(path, &options.reading())?));
     }
     let protocol = options.protocol()?;
     let shapes = data::open(options.data.as_deref(), protocol.shapes)?;

@@ -19,7 +19,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Vector3};
-use srrf_cloud::io::{Array, ArrayError, NpzArrays, NpzWriter, read_npz, write_atomically};
+use srrf_cloud::io::{Array, ArrayError, NpzArrays, NpzWriter, ReadOptions, read_npz, write_atomically};
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::Pair;
 
@@ -50,12 +50,12 @@ struct GroupArrays {
 }
 
 impl PairFile {
-    /// Reads and checks a file of pairs.
+    /// Reads and checks a file of pairs, within the memory that the options allow.
     ///
     /// # Errors
     /// [`ArrayError`] which names the file, the array, what is wrong and what is expected.
-    pub fn read(path: &Path) -> Result<Self, ArrayError> {
-        let NpzArrays { names: have, mut arrays } = read_npz(path)?;
+    pub fn read(path: &Path, options: &ReadOptions) -> Result<Self, ArrayError> {
+        let NpzArrays { names: have, mut arrays } = read_npz(path, options)?;
         let mut names: Vec<&str> = Vec::new();
         for array in &have {
             let group = ["_x", "_y", "_R", "_t"].iter().find_map(|end| array.strip_suffix(end));

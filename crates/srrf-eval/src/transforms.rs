@@ -11,13 +11,12 @@
 //! A transform that holds NaN counts as failed, as `null` does.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use srrf_cloud::Rigid;
-use srrf_cloud::io::{Array, read_npy, read_npz};
+use srrf_cloud::io::{Array, ReadOptions, read_file, read_npy, read_npz};
 
 use crate::EvalError;
 use crate::metrics::is_finite;
@@ -34,18 +33,21 @@ pub struct Transforms {
 }
 
 impl Transforms {
-    /// Reads transforms for the pairs of `groups`.
+    /// Reads transforms for the pairs of `groups`, within the memory that the options allow.
     ///
     /// # Errors
     /// [`EvalError::Transforms`] or [`EvalError::Arrays`] with the file, what is wrong with it and
     /// what is expected.
-    pub fn read(path: &Path, groups: &[Group]) -> Result<Self, EvalError> {
+    pub fn read(path: &Path, groups: &[Group], options: &ReadOptions) -> Result<Self, EvalError> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
         let per_group = match extension.as_str() {
-            "npz" => from_npz(&read_npz(path)?.arrays, groups),
-            "npy" => matrices(&read_npy(path)?).and_then(|all| split(all, groups)),
+            "npz" => from_npz(&read_npz(path, options)?.arrays, groups),
+            "npy" => matrices(&read_npy(path, options)?).and_then(|all| split(all, groups)),
             "json" => {
-                fs::read_to_string(path).map_err(|e| e.to_string()).and_then(|text| from_json(&text, groups))
+                let text = read_file(path, options).map_err(|e| e.to_string()).and_then(|bytes| {
+                    String::from_utf8(bytes).map_err(|_| "not UTF-8; save it in UTF-8".to_owned())
+                });
+                text.and_then(|text| from_json(&text, groups))
             }
             _ => Err("transforms are read from .npz, .npy and .json files".to_owned()),
         };
@@ -187,6 +189,8 @@ fn checked(group: &Group, poses: Poses) -> Result<Poses, String> {
 mod tests {
     use srrf_cloud::EulerXyz;
 
+    use std::fs;
+
     use super::*;
     use srrf_cloud::io::NpzWriter;
 
@@ -235,13 +239,13 @@ mod tests {
         writer.array("clean_t", &[1, 3], pose_of(0).translation.as_slice()).unwrap();
         writer.array("cutout_s3_T", &[2, 4, 4], &values[1..].concat()).unwrap();
         writer.finish().unwrap();
-        let read = Transforms::read(&npz, &groups()).unwrap();
+        let read = Transforms::read(&npz, &groups(), &ReadOptions::default()).unwrap();
         assert_eq!(read.name, "tool");
         check(&read);
 
         let npy = folder.path().join("tool.npy");
         fs::write(&npy, npy_bytes(&[3, 4, 4], &values.concat())).unwrap();
-        check(&Transforms::read(&npy, &groups()).unwrap());
+        check(&Transforms::read(&npy, &groups(), &ReadOptions::default()).unwrap());
 
         let matrix = |v: &[f64]| v.chunks(4).map(<[f64]>::to_vec).collect::<Vec<_>>();
         let json = folder.path().join("tool.json");
@@ -249,10 +253,10 @@ mod tests {
             "clean": [matrix(&values[0])], "cutout_s3": [matrix(&values[1]), null]
         });
         fs::write(&json, by_group.to_string()).unwrap();
-        check(&Transforms::read(&json, &groups()).unwrap());
+        check(&Transforms::read(&json, &groups(), &ReadOptions::default()).unwrap());
         let list = serde_json::json!([matrix(&values[0]), matrix(&values[1]), null]);
         fs::write(&json, list.to_string()).unwrap();
-        check(&Transforms::read(&json, &groups()).unwrap());
+        check(&Transforms::read(&json, &groups(), &ReadOptions::default()).unwrap());
     }
 
     #[test]
@@ -261,7 +265,7 @@ mod tests {
         let message = |name: &str, bytes: &[u8]| {
             let path = folder.path().join(name);
             fs::write(&path, bytes).unwrap();
-            Transforms::read(&path, &groups()).unwrap_err().to_string()
+            Transforms::read(&path, &groups(), &ReadOptions::default()).unwrap_err().to_string()
         };
         let npy = npy_bytes;
         let two = message("a.npy", &npy(&[2, 4, 4], &[0.0; 32]));
@@ -274,7 +278,23 @@ mod tests {
         assert!(message("a.json", b"{}").contains("no transforms for the group clean"));
         assert!(message("a.json", b"7").contains("not what is expected"));
         assert!(message("a.txt", b"").contains(".npz, .npy and .json"));
-        let missing = Transforms::read(&folder.path().join("none.npy"), &groups()).unwrap_err().to_string();
+        let missing = Transforms::read(&folder.path().join("none.npy"), &groups(), &ReadOptions::default())
+            .unwrap_err()
+            .to_string();
         assert!(missing.contains("none.npy"), "{missing}");
+    }
+
+    #[test]
+    fn memory_is_bounded() {
+        let folder = tempfile::tempdir().unwrap();
+        let limited = ReadOptions { max_memory: Some(300), ..ReadOptions::default() };
+        for name in ["a.npy", "a.json"] {
+            let path = folder.path().join(name);
+            let values = [0.0; 3 * 16];
+            let bytes = if name == "a.npy" { npy_bytes(&[3, 4, 4], &values) } else { vec![b' '; 400] };
+            fs::write(&path, bytes).unwrap();
+            let error = Transforms::read(&path, &groups(), &limited).unwrap_err().to_string();
+            assert!(error.contains(name) && error.contains("--max-memory"), "{error}");
+        }
     }
 }

@@ -2,12 +2,9 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use srrf_cloud::{LEAST_SAMPLES, MOST_SAMPLES, PointCloud, TriangleMesh};
+use srrf_cloud::{FEWEST_SCANNED, LEAST_SAMPLES, MOST_SAMPLES, PointCloud, TriangleMesh};
 
 use crate::scale::CloudSize;
-
-/// A mesh of fewer vertices than this is drawn by hand or by a program, not scanned: its vertices are no cloud.
-const FEWEST_SCANNED: usize = 2_000;
 
 /// What a surface is registered with.
 #[derive(Debug, Clone, Copy)]

@@ -88,6 +88,14 @@ fn a_part_in_millimetres_and_a_scan_in_metres_are_told_apart_and_brought_togethe
     assert_eq!(result["abstain"], false);
     let error = worst(&scene, &pose_of_json(&result), &truth, 0.001);
     assert!(error < 1e-4, "{error} m");
+    // The vertices of the part in metres, moved; not the points that were drawn.
+    let (saved, pose) = (read_cloud(&scene.path("moved.ply")).unwrap(), pose_of_json(&result));
+    let corners = read_cloud(&scene.path("part.stl")).unwrap();
+    assert_eq!(saved.len(), corners.len());
+    for (saved, corner) in saved.points().iter().zip(corners.points()) {
+        let expected = pose.apply(&corner.map(|c| 0.001 * c));
+        assert!((0..3).all(|c| (saved[c] - expected[c]).abs() < 1e-6), "{saved:?}, not {expected:?}");
+    }
 
     // The same question the other way round, and in a batch.
     scene.file("pairs.csv", "source,target\nscan.ply,part.stl\n");
@@ -149,6 +157,19 @@ fn piles_of_zeros_are_no_returns() {
     );
     assert_eq!(result["points"]["source"], 2000);
     assert_eq!(result["evidence"]["fitness"], 1.0);
+    // A moved copy holds them, moved with the rest; a scaled one has the points that were registered.
+    let places = |name: &str| read_cloud(&scene.path(name)).unwrap().into_points();
+    let far = |found: &[f64; 3], expected: [f64; 3]| (0..3).any(|c| (found[c] - expected[c]).abs() > 1e-6);
+    let (_, result) = run(&["--save", "moved.xyz"]);
+    let (pose, saved) = (pose_of_json(&result), places("moved.xyz"));
+    assert_eq!(saved.len(), 2700);
+    assert!(saved[..700].iter().all(|p| !far(p, pose.apply(&[0.0; 3]))), "{:?}", saved[0]);
+    assert!(saved[700..].iter().zip(&near).all(|(p, before)| !far(p, pose.apply(before))));
+    let (out, result) = run(&["--scale", "1.5", "--save", "scaled.xyz"]);
+    assert!(out.contains("scaled.xyz: the points of the source, scaled and moved"), "{out}");
+    let (pose, saved) = (pose_of_json(&result), places("scaled.xyz"));
+    assert_eq!(saved.len(), 2000);
+    assert!(saved.iter().zip(&near).all(|(p, before)| !far(p, pose.apply(&before.map(|c| 1.5 * c)))));
     let (out, result) = run(&["--keep-zeros"]);
     assert!(!out.contains("were left out"), "{out}");
     assert_eq!(result["points"]["source"], 2700);
@@ -159,6 +180,41 @@ fn piles_of_zeros_are_no_returns() {
         2,
         "each of its 50 points lies at exactly 0, 0, 0",
     );
+}
+
+#[test]
+fn other_verbs_draw_meshes_too() {
+    let (scene, _) = cad(false);
+    let corners = read_cloud(&scene.path("part.stl")).unwrap();
+    let inspect = |more: &[&str]| {
+        let out = scene.srrf(&[&["inspect", "part.stl", "--json"][..], more].concat()).ok().out;
+        serde_json::from_str::<Value>(&out).unwrap()[0].clone()
+    };
+    let found = inspect(&[]);
+    assert_eq!((&found["faces"], &found["points"]), (&Value::from(36), &Value::from(corners.len())));
+    assert_eq!(found["surface"]["points"], 20_000);
+    let high: f64 = corners.points().iter().map(|p| p[0]).fold(f64::NEG_INFINITY, f64::max);
+    assert_eq!(found["high"][0], high, "the box is that of the vertices");
+    let spacing = found["spacing"].as_f64().unwrap();
+    let drawn = found["surface"]["spacing"].as_f64().unwrap();
+    assert!((spacing / drawn - 1.0).abs() < 0.3, "{spacing} {drawn}");
+    assert_eq!(inspect(&["--vertices"])["surface"], Value::Null);
+    let text = scene.srrf(&["inspect", "part.stl"]).ok().out;
+    assert!(text.contains("20,000 points drawn from its surface"), "{text}");
+
+    let corrupt = |more: &[&str]| {
+        let words = ["corrupt", "part.stl", "-c", "gaussian", "-o", "c.ply"];
+        let out = scene.srrf(&[&words[..], more].concat()).ok().out;
+        (out, read_cloud(&scene.path("c.ply")).unwrap().len())
+    };
+    let (out, points) = corrupt(&[]);
+    assert!(
+        points == 20_000 && out.contains("part.stl is a mesh of 36 faces: 20,000 points drawn"),
+        "{points} {out}"
+    );
+    assert_eq!(corrupt(&["--vertices"]).1, corners.len());
+    let out = scene.srrf(&["skeleton", "part.stl", "-o", "s.ply"]).ok().out;
+    assert!(out.contains("20,000 points drawn from its surface"), "{out}");
 }
 
 #[test]

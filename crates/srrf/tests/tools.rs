@@ -31,6 +31,45 @@ fn inspect_says_what_is_there() {
 }
 
 #[test]
+fn inspect_names_what_is_no_measurement() {
+    let scene = Scene::new(900);
+    let rows =
+        |points: &[[f64; 3]]| points.iter().map(|[x, y, z]| format!("{x},{y},{z}\n")).collect::<String>();
+    let mut points = scene.source.points().to_vec();
+    points.insert(41, [9e6, 0.0, 0.0]);
+    scene.file("stray.csv", format!("x,y,z\n,,\n{}", rows(&points)));
+    let text = scene.srrf(&["inspect", "stray.csv"]).ok().out;
+    // The row before it that is empty counts.
+    assert!(text.contains("point 42 (from 0) at (9000000, 0, 0) lies"), "{text}");
+    assert!(text.contains("numpy.delete(points, 42, axis=0)"), "{text}");
+    assert!(
+        text.contains("1 row lacks a coordinate") && text.contains("and 1 with NaN or infinity"),
+        "{text}"
+    );
+    let json = |name: &str| {
+        serde_json::from_str::<Value>(&scene.srrf(&["inspect", "--json", name]).ok().out).unwrap()[0].clone()
+    };
+    let found = json("stray.csv");
+    assert_eq!(found["odd_numbers"]["strays"][0]["index"], 42);
+    assert_eq!(found["warnings"].as_array().unwrap().len(), 1);
+    assert_eq!(json("source.ply")["warnings"].as_array().unwrap().len(), 0);
+    let huge: Vec<[f64; 3]> = scene.source.points().iter().map(|p| p.map(|c| 1e30 * (c + 1e7))).collect();
+    scene.file("huge.csv", rows(&huge));
+    assert!(
+        json("huge.csv")["warnings"][0]
+            .as_str()
+            .unwrap()
+            .contains("in 900 points, the first of them point 0")
+    );
+    // A switch that says nothing to a format is not passed over.
+    let done = scene.srrf(&["inspect", "source.ply", "--columns", "1,2,3"]);
+    assert!(
+        done.code == 2 && done.err.contains("`--columns` says nothing to a file of the format ply"),
+        "{done:?}"
+    );
+}
+
+#[test]
 fn corrupt_is_seeded() {
     let scene = Scene::new(600);
     let run = |out: &str, seed: &str| {

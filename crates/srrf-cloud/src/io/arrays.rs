@@ -1,12 +1,13 @@
 //! Arrays of any shape in NumPy's `.npy` and `.npz` files.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 
+use super::file::read_file;
 use super::npy::Array;
-use super::{FormatError, npz};
+use super::{FormatError, IoError, ReadOptions, npz};
 
 /// Why a NumPy file cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -49,17 +50,26 @@ pub enum ArrayError {
     },
 }
 
-/// Reads a `.npy` file.
+/// Reads a `.npy` file, within [`ReadOptions::max_memory`].
 ///
 /// # Errors
 /// [`ArrayError`] with the file and what is wrong with it.
-pub fn read_npy(path: &Path) -> Result<Array, ArrayError> {
-    let bytes = fs::read(path).map_err(|source| ArrayError::Io { path: path.to_owned(), source })?;
-    Array::parse(&bytes).map_err(|source| ArrayError::Format {
-        path: path.to_owned(),
-        array: "(the only one)".into(),
-        source,
-    })
+pub fn read_npy(path: &Path, options: &ReadOptions) -> Result<Array, ArrayError> {
+    let only = |source| ArrayError::Format { path: path.to_owned(), array: "(the only one)".into(), source };
+    let bytes = read_file(path, options).map_err(|error| match error {
+        IoError::Read { path, source } => ArrayError::Io { path, source },
+        IoError::Format { source, .. } => only(source),
+        other => ArrayError::Io { path: path.to_owned(), source: io::Error::other(other) },
+    })?;
+    parse(&bytes, bytes.len(), options).map_err(only)
+}
+
+/// An array whose numbers have room beside the `held` bytes.
+fn parse(bytes: &[u8], held: usize, options: &ReadOptions) -> Result<Array, FormatError> {
+    let numbers = Array::numbers(bytes)?;
+    // Those of Fortran's order are put into another list.
+    options.check_memory(&format!("{numbers} numbers"), held, numbers.saturating_mul(16))?;
+    Array::parse(bytes)
 }
 
 /// The arrays of a `.npz` file.
@@ -71,27 +81,33 @@ pub struct NpzArrays {
     pub arrays: BTreeMap<String, Array>,
 }
 
-/// Reads all arrays of a `.npz` file.
+/// Reads all arrays of a `.npz` file, within [`ReadOptions::max_memory`].
 ///
 /// # Errors
 /// [`ArrayError`] with the file, the array and what is wrong with it.
-pub fn read_npz(path: &Path) -> Result<NpzArrays, ArrayError> {
+pub fn read_npz(path: &Path, options: &ReadOptions) -> Result<NpzArrays, ArrayError> {
     let file = File::open(path).map_err(|source| ArrayError::Io { path: path.to_owned(), source })?;
     let size = file.metadata().map_err(|source| ArrayError::Io { path: path.to_owned(), source })?.len();
     let archive = |source| ArrayError::Archive { path: path.to_owned(), source };
     let mut zip = zip::ZipArchive::new(BufReader::new(file)).map_err(archive)?;
     let mut npz = NpzArrays::default();
+    let mut held = 0usize;
     for index in 0..zip.len() {
         let mut entry = zip.by_index(index).map_err(archive)?;
         let Some(name) = entry.name().map_err(archive)?.strip_suffix(".npy").map(str::to_owned) else {
             continue;
         };
-        let bytes = npz::unpack(&mut entry, size).and_then(|bytes| Array::parse(&bytes));
+        let said = usize::try_from(entry.size()).unwrap_or(usize::MAX);
+        let bytes = options
+            .check_memory("the unpacked arrays", held, said)
+            .and_then(|()| npz::unpack(&mut entry, size))
+            .and_then(|bytes| parse(&bytes, held.saturating_add(bytes.len()), options));
         let array = bytes.map_err(|source| ArrayError::Format {
             path: path.to_owned(),
             array: name.clone(),
             source,
         })?;
+        held += size_of_val(&array.values[..]);
         npz.names.push(name.clone());
         npz.arrays.insert(name, array);
     }

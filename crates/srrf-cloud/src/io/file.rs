@@ -53,10 +53,7 @@ impl CloudFile {
         if let Err(left_out @ IoError::LeftOut { .. }) = known {
             return Err(left_out);
         }
-        let unread = |source| IoError::Read { path: path.to_owned(), source };
-        let file = fs::File::open(path).map_err(unread)?;
-        let length = file.metadata().map_err(unread)?.len();
-        let bytes = read_within(file, length, path, &options)?;
+        let bytes = read_file(path, &options)?;
         let format = match known {
             Ok(format) => format,
             Err(_) => detect(path, &bytes)?,
@@ -349,6 +346,17 @@ fn scan_of(path: &Path) -> Option<(PathBuf, usize)> {
     let file = path.with_file_name(file);
     let number = number.parse().ok()?;
     (!path.exists() && file.is_file()).then_some((file, number))
+}
+
+/// All bytes of a file of any kind, as far as they are allowed to take memory.
+///
+/// # Errors
+/// [`IoError::Read`]; [`IoError::Format`] where they are not.
+pub fn read_file(path: &Path, options: &ReadOptions) -> Result<Vec<u8>, IoError> {
+    let unread = |source| IoError::Read { path: path.to_owned(), source };
+    let file = fs::File::open(path).map_err(unread)?;
+    let length = file.metadata().map_err(unread)?.len();
+    read_within(file, length, path, options)
 }
 
 /// All bytes, about `length` of them, as far as they are allowed to take memory.

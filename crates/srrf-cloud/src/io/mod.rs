@@ -60,11 +60,13 @@ pub use arrays::{ArrayError, NpzArrays, read_npy, read_npz};
 pub use atomic::{place_of, remove_left_overs, write_atomically};
 pub use contents::{Attribute, AttributeValues, Contents, Note, ScanEntry};
 pub use error::{FormatError, IoError};
-pub use file::{CloudFile, format_names};
+pub use file::{CloudFile, format_names, read_file};
 pub use npy::Array;
 pub use npz_writer::NpzWriter;
 pub use options::{ColumnName, OptionError, PointColumns, PointLayout, ReadOptions, ReadSwitch};
 pub use outgoing::{Kept, Outgoing, WhyDouble};
+#[cfg(feature = "parquet")]
+pub use parquet::check_parquet;
 pub use text::parse_point;
 
 /// A file format for clouds.

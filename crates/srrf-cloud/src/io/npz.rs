@@ -239,6 +239,7 @@ fn cannot_unpack(problem: String) -> FormatError {
 pub(super) fn unpack(entry: &mut ZipFile<'_, impl Read>, file: u64) -> Result<Vec<u8>, FormatError> {
     let problem = cannot_unpack;
     let most = entry.compressed_size().min(file).saturating_mul(RATIO).saturating_add(SLACK);
+    // The size that it says has been checked against the memory; the reader unpacks no more than that.
     let mut array = Vec::new();
     entry.take(most + 1).read_to_end(&mut array).map_err(|e| problem(e.to_string()))?;
     if array.len() as u64 > most {
@@ -319,6 +320,21 @@ mod tests {
         assert!(bomb.len() < 20_000);
         assert!(points_of(&Npz, &bomb).unwrap_err().to_string().contains("200 times"));
         let good = archive(&[("points.npy", B)], CompressionMethod::Deflated);
+        // An archive that says of an array that it has nearly 4 GB, and one that says that it has 64 bytes.
+        let claiming = |size: u32| {
+            let mut bytes = good.clone();
+            let places = [(&b"PK\x03\x04"[..], 22), (b"PK\x01\x02", 24)];
+            for (mark, field) in places {
+                let at = bytes.windows(4).position(|word| word == mark).unwrap() + field;
+                bytes[at..at + 4].copy_from_slice(&size.to_le_bytes());
+            }
+            bytes
+        };
+        let limited = ReadOptions { max_memory: Some(1 << 20), ..ReadOptions::default() };
+        let error = Npz.read(&claiming(4_000_000_000), &limited).unwrap_err();
+        assert!(matches!(error, FormatError::Memory { needed: 4_000_000_000.., .. }), "{error}");
+        let error = points_of(&Npz, &claiming(64)).unwrap_err().to_string();
+        assert!(error.contains("larger than its declared"), "{error}");
         for length in 0..good.len() {
             assert!(points_of(&Npz, &good[..length]).is_err(), "{length}");
         }

@@ -95,7 +95,7 @@ impl<W: Write> Write for Fallible<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::read_npz;
+    use crate::io::{ReadOptions, read_npz};
 
     #[test]
     fn archives_have_stable_bytes() {
@@ -108,11 +108,16 @@ mod tests {
         assert_eq!(write(), write());
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), write()).unwrap();
-        let npz = read_npz(file.path()).unwrap();
+        let npz = read_npz(file.path(), &ReadOptions::default()).unwrap();
         assert_eq!(npz.names, ["a_x", "a_t"]);
         assert_eq!(npz.arrays["a_x"].shape, [1, 2, 3]);
         std::fs::write(file.path(), "text").unwrap();
-        assert!(read_npz(file.path()).unwrap_err().to_string().contains("not an .npz archive"));
+        assert!(
+            read_npz(file.path(), &ReadOptions::default())
+                .unwrap_err()
+                .to_string()
+                .contains("not an .npz archive")
+        );
     }
 
     #[test]

@@ -7,6 +7,7 @@ use clap::Args;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use srrf_args::flags::{Quiet, Seed, value};
 use srrf_args::reading::ReadFlags;
+use srrf_args::surface::SurfaceFlag;
 use srrf_args::words::{count, points};
 use srrf_args::{Failure, Output, Places, ProgressArgs, files};
 use srrf_cloud::PointCloud;
@@ -20,7 +21,8 @@ use crate::severity::Severity;
 
 /// Corrupt a cloud in one of twelve ways, to see what a registration stands.
 ///
-/// The cloud is brought to the unit sphere, corrupted there, and mapped back. Points with NaN are left out.
+/// The cloud is brought to the unit sphere, corrupted there, and mapped back. Points with NaN are left out. A mesh is
+/// corrupted as points drawn from its surface.
 #[derive(Debug, Args)]
 pub struct CorruptArgs {
     /// The cloud, or `-`
@@ -68,6 +70,9 @@ pub struct CorruptArgs {
     read: ReadFlags,
 
     #[command(flatten)]
+    surface: SurfaceFlag,
+
+    #[command(flatten)]
     quiet: Quiet,
 
     #[command(flatten)]
@@ -87,7 +92,8 @@ pub fn corrupt(args: &CorruptArgs) -> Result<ExitCode, Failure> {
     Places::new().reads("the cloud", &**input).writes_cloud("--output", &**output)?.check()?;
     let progress = args.progress.start(args.quiet.quiet);
     progress.step(format!("reading {input:?}"));
-    let input = files::read(input, None, args.read.options())?;
+    let mut input = files::read(input, None, args.read.options())?;
+    let drawn = args.surface.draw_alone(&mut input, args.seed.seed)?;
     progress.step(format!("corrupting {:?}", input.name));
     let (unit, frame) = input.cloud.to_unit_sphere();
     let corruption = corruption(kind, &args.reading.variants());
@@ -119,6 +125,7 @@ pub fn corrupt(args: &CorruptArgs) -> Result<ExitCode, Failure> {
         count(corrupted.len()),
         count(added),
     ));
+    drawn.iter().for_each(|drawn| out.say(&format!("{} is {}", input.name, drawn.text())));
     input.notes.iter().for_each(|note| out.say(&format!("warning: {}: {note}.", input.name)));
     Ok(ExitCode::SUCCESS)
 }

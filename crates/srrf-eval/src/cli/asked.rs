@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::de::DeserializeOwned;
 use srrf_args::flags::Threads;
 use srrf_args::{Failure, OutputKind, Places};
+use srrf_cloud::io::ReadOptions;
 use srrf_corrupt::{CorruptionKind, PairConfig, RotationRange, Severity};
 
 use super::EvalOptions;
@@ -14,6 +15,11 @@ use crate::EvalError;
 use crate::protocol::{CLEAN, Protocol};
 
 impl EvalOptions {
+    /// How files of arrays are read.
+    pub fn reading(&self) -> ReadOptions {
+        ReadOptions { max_memory: self.max_memory, ..ReadOptions::default() }
+    }
+
     /// The pairs that the options ask for.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::{CommandFactory, Parser, Subcommand};
 use srrf_args::Scripts;
 use srrf_args::flags::{MOST_POINTS, MOST_SHAPES, MOST_THREADS, help, value};
-use srrf_args::numbers::{entry, real, whole};
+use srrf_args::numbers::{bytes, entry, real, whole};
 use srrf_corrupt::Severity;
 use srrf_corrupt::cli::ReadingArgs;
 
@@ -124,6 +124,10 @@ pub struct EvalOptions {
     /// given more than once
     #[arg(long, value_name = "FILE")]
     pub transforms: Vec<PathBuf>,
+
+    /// Most memory that reading --pairs or --transforms may take, such as `4G` [default: half of the machine's]
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    pub max_memory: Option<u64>,
 
     /// Points of each cloud.
     #[arg(

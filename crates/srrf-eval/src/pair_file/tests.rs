@@ -27,7 +27,7 @@ fn exported_pairs_are_read_back_whole() {
     let mut done = 0;
     export(&synthesized(), &path, &mut || done += 1).unwrap();
     assert_eq!(done, 10);
-    let file = PairFile::read(&path).unwrap();
+    let file = PairFile::read(&path, &ReadOptions::default()).unwrap();
     let names: Vec<String> = file.groups().iter().map(Group::name).collect();
     assert_eq!(names, ["clean", "background_s2"]);
     assert!(file.has_oracle());
@@ -65,7 +65,7 @@ fn message(change: impl Fn(&mut BTreeMap<&'static str, (Vec<usize>, Vec<f64>)>))
         npz.array(name, shape, values).unwrap();
     }
     npz.finish().unwrap();
-    match PairFile::read(file.path()) {
+    match PairFile::read(file.path(), &ReadOptions::default()) {
         Ok(file) => file.description(),
         Err(error) => {
             let text = error.to_string();
@@ -93,4 +93,17 @@ fn bad_arrays_are_named_with_the_fact() {
         a.insert("source", (vec![1], vec![0.0]));
     });
     assert!(text.contains("<group>_x") && text.contains("[\"source\"]"), "{text}");
+}
+
+/// A file that would take more than is allowed is refused before its arrays are unpacked.
+#[test]
+fn memory_is_bounded() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pairs.npz");
+    export(&synthesized(), &path, &mut || ()).unwrap();
+    let limited = |bytes| ReadOptions { max_memory: Some(bytes), ..ReadOptions::default() };
+    let error = PairFile::read(&path, &limited(2_000)).unwrap_err().to_string();
+    assert!(error.contains("pairs.npz") && error.contains("2.0 kB are allowed"), "{error}");
+    assert!(error.contains("--max-memory"), "{error}");
+    PairFile::read(&path, &limited(2_000_000)).unwrap();
 }

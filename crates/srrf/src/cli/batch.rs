@@ -159,7 +159,7 @@ pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
     places.check()?;
     let _lock = OutputLock::take(output)?;
     let threads = args.common.threads.start()?;
-    let pairs = PairList::read(list)?;
+    let pairs = PairList::read(list, &args.read.source())?;
     pairs.read_by(places).check()?;
     let bar = args.common.progress();
     bar.step("loading the network");

@@ -7,15 +7,17 @@ use std::process::ExitCode;
 use clap::Args;
 use serde_json::{Value, json};
 use srrf_cloud::Solid;
-use srrf_cloud::io::{CloudFile, ReadOptions, ScanEntry};
+use srrf_cloud::io::{CloudFile, Note, ReadOptions, ScanEntry};
 
 use super::scans;
 use super::statistics::Statistics;
+use super::strays::OddNumbers;
 use srrf_args::Failure;
 use srrf_args::Output;
 use srrf_args::files::{self, Input};
 use srrf_args::flags::Common;
 use srrf_args::reading::ReadFlags;
+use srrf_args::surface::{DrawnAlone, DrawnHow, SurfaceFlag};
 use srrf_args::words::{count, length, points, vector};
 
 /// Say what is in clouds: sizes, bounds, spacing, points with NaN, and what looks corrupted.
@@ -33,6 +35,9 @@ pub struct InspectArgs {
     read: ReadFlags,
 
     #[command(flatten)]
+    surface: SurfaceFlag,
+
+    #[command(flatten)]
     common: Common,
 }
 
@@ -47,7 +52,7 @@ pub fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
     let progress = args.common.progress();
     for path in &args.files {
         progress.step(format!("reading {path:?}"));
-        let inspected = inspect(path, args.read.options());
+        let inspected = inspect(path, args.read.options(), args.surface);
         progress.clear();
         match inspected {
             Ok(found) if args.json => values.push(found.to_json()),
@@ -69,28 +74,51 @@ pub fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
 /// What is known of a file.
 enum Found {
     /// A cloud, and the scans that it is made of if they are several.
-    Cloud(Box<Input>, Statistics, Vec<ScanEntry>),
+    Cloud(Box<Inspected>, Vec<ScanEntry>),
     /// Several scans that are no one cloud.
-    Scans(CloudFile, Vec<ScanEntry>),
+    Scans(Box<CloudFile>, Vec<ScanEntry>),
 }
 
-fn inspect(path: &Path, options: ReadOptions) -> Result<Found, Failure> {
-    let input = match files::read(path, None, options.clone()) {
+/// A cloud, and what was found out about it.
+struct Inspected {
+    input: Input,
+    /// Of the cloud, or of the points drawn from a surface.
+    statistics: Statistics,
+    odd: OddNumbers,
+    drawn: Option<DrawnAlone>,
+}
+
+fn inspect(path: &Path, options: ReadOptions, surface: SurfaceFlag) -> Result<Found, Failure> {
+    let mut input = match files::read(path, None, options.clone()) {
         Ok(input) => input,
         Err(failure) => {
             let (file, scans) = scans::of_path(path, options).ok_or(failure)?;
-            return Ok(Found::Scans(file, scans));
+            return Ok(Found::Scans(Box::new(file), scans));
         }
     };
-    let statistics = Statistics::new(&input.cloud).map_err(|e| Failure::cloud(&input.name, &e))?;
+    let of = |input: &Input| Statistics::new(&input.cloud).map_err(|e| Failure::cloud(&input.name, &e));
+    let vertices = of(&input)?;
+    let odd = OddNumbers::of(&input.cloud, vertices.spacing, input.kept.as_deref());
+    // Faces without an area are worth a word, and no reason to say nothing else.
+    let (drawn, flaw) = match surface.draw_alone(&mut input, 0) {
+        Ok(drawn) => (drawn, None),
+        Err(failure) => (None, Some(failure.to_string())),
+    };
+    input.notes.extend(flaw.map(|what| Note::Ignored { what: format!("the faces: {what}") }));
+    let mut statistics = vertices.clone();
+    if drawn.as_ref().is_some_and(|drawn| matches!(drawn.how, DrawnHow::Points(..))) {
+        // The box and the number of points are those of the file.
+        statistics =
+            Statistics { points: vertices.points, low: vertices.low, high: vertices.high, ..of(&input)? };
+    }
     let several = scans::several(&input.file);
-    Ok(Found::Cloud(Box::new(input), statistics, several))
+    Ok(Found::Cloud(Box::new(Inspected { input, statistics, odd, drawn }), several))
 }
 
 impl Found {
     fn to_json(&self) -> Value {
         let (mut value, several) = match self {
-            Self::Cloud(input, statistics, several) => (to_json(input, statistics), several),
+            Self::Cloud(inspected, several) => (to_json(inspected), several),
             Self::Scans(file, scans) => {
                 (json!({ "file": file.path().display().to_string(), "format": file.format() }), scans)
             }
@@ -105,7 +133,7 @@ impl Found {
 
     fn to_text(&self) -> String {
         let (mut out, several) = match self {
-            Self::Cloud(input, statistics, several) => (to_text(input, statistics), several),
+            Self::Cloud(inspected, several) => (to_text(inspected), several),
             Self::Scans(file, scans) => (format!("{}: {}\n", file.path().display(), file.format()), scans),
         };
         for (index, line) in scans::in_words(several).into_iter().enumerate() {
@@ -117,7 +145,7 @@ impl Found {
     }
 }
 
-fn to_json(input: &Input, statistics: &Statistics) -> Value {
+fn to_json(Inspected { input, statistics, odd, drawn }: &Inspected) -> Value {
     let mut value = json!(statistics);
     if let Value::Object(map) = &mut value {
         map.insert("file".into(), json!(input.name));
@@ -128,13 +156,20 @@ fn to_json(input: &Input, statistics: &Statistics) -> Value {
         map.insert("viewpoint".into(), json!(input.viewpoint));
         map.insert("grid".into(), json!(input.grid));
         map.insert("notes".into(), json!(input.notes.iter().map(ToString::to_string).collect::<Vec<_>>()));
+        let surface = drawn.as_ref().and_then(|drawn| match drawn.how {
+            DrawnHow::Points(points, spacing) => Some(json!({ "points": points, "spacing": spacing })),
+            DrawnHow::Asked | DrawnHow::Dense => None,
+        });
+        map.insert("surface".into(), json!(surface));
+        map.insert("odd_numbers".into(), json!(odd));
+        map.insert("warnings".into(), json!(odd.text()));
         map.insert("suggestions".into(), json!(statistics.suggestions()));
         map.insert("determines_rotation".into(), json!(Solid::new(&input.cloud).is_ok()));
     }
     value
 }
 
-fn to_text(input: &Input, s: &Statistics) -> String {
+fn to_text(Inspected { input, statistics: s, odd, drawn }: &Inspected) -> String {
     let mut out = String::new();
     let mut line = |label: &str, value: String| {
         // Writing to a string cannot fail.
@@ -147,6 +182,9 @@ fn to_text(input: &Input, s: &Statistics) -> String {
     line("points", format!("{}{dropped}", count(s.points)));
     if !input.faces.is_empty() {
         line("faces", format!("{} triangles", count(input.faces.len())));
+    }
+    if let Some(drawn) = drawn {
+        line("surface", drawn.text());
     }
     if let Some([width, height]) = input.grid {
         line("grid", format!("{width} x {height}"));
@@ -189,6 +227,7 @@ fn to_text(input: &Input, s: &Statistics) -> String {
     if let Err(e) = Solid::new(&input.cloud) {
         line("warning", format!("it cannot be registered: {e}"));
     }
+    odd.text().into_iter().for_each(|odd| line("warning", odd));
     let suggestions = s.suggestions();
     for suggestion in &suggestions {
         line("maybe", suggestion.clone());

@@ -31,6 +31,7 @@ mod scale;
 mod scans;
 mod skeleton;
 mod statistics;
+mod strays;
 mod summary;
 mod surface;
 mod values;

@@ -1,5 +1,6 @@
 //! Poses that the verbs read and write.
 
+use std::io::Read;
 use std::path::Path;
 
 use clap::Args;
@@ -31,16 +32,21 @@ impl PoseReading {
     /// # Errors
     /// [`Failure::usage`], which names the file and what is wrong with it.
     pub fn read(self, path: &Path) -> Result<PoseFile, Failure> {
-        let bytes = if is_stream(path) {
-            let mut bytes = Vec::new();
-            std::io::Read::read_to_end(&mut std::io::stdin().lock(), &mut bytes).map(|_| bytes)
+        let mut bytes = Vec::new();
+        let read = if is_stream(path) {
+            std::io::stdin().lock().take(MOST + 1).read_to_end(&mut bytes)
         } else {
-            std::fs::read(path)
+            std::fs::File::open(path).and_then(|file| file.take(MOST + 1).read_to_end(&mut bytes))
         };
-        let bytes = bytes.map_err(|e| {
+        read.map_err(|e| {
             Failure::usage(format!("cannot read {path:?}: {e}; it should hold a pose, such as 4 rows of 4"))
                 .because(e)
         })?;
+        if bytes.len() as u64 > MOST {
+            return Err(Failure::usage(format!(
+                "{path:?} is larger than any file of a pose; it should hold one, such as 4 rows of 4"
+            )));
+        }
         PoseFile::parse(&bytes, self.quaternion)
             .map_err(|e| Failure::usage(format!("{path:?}: {e}")).because(e))
     }
@@ -51,6 +57,9 @@ pub fn described(flag: &str, pose: &PoseFile) -> String {
     let abstained = if pose.abstained { "; the file says `abstain` of it" } else { "" };
     format!("{flag}: {}, taken as target_from_source{abstained}", pose.layout)
 }
+
+/// Bytes of the largest file of a pose; results of `--json` with long notes are far smaller.
+const MOST: u64 = 64 << 20;
 
 /// How to write a pose.
 #[derive(Debug, Clone, Copy, Args)]

@@ -205,8 +205,11 @@ impl RegisterArgs {
             let (what, kept) = if whole {
                 ("the moved source", files::write_moved(path, &source.file, pose)?)
             } else {
-                let moved = source.cloud.transformed(pose);
-                ("the points of the source, scaled and moved", files::write_points(path, &moved, source)?)
+                let factor = outcome.scale.map_or(1.0, |scale| scale.factor);
+                (
+                    "the points of the source, scaled and moved",
+                    files::write_scaled(path, source, factor, pose)?,
+                )
             };
             lines.push(wrote(path, &kept_words(what, &kept, whole)));
         }

@@ -10,6 +10,7 @@ use srrf::FoundSkeleton;
 use super::common::{failed, warnings_of};
 use srrf_args::flags::{Common, Device, Weights, value};
 use srrf_args::reading::ReadFlags;
+use srrf_args::surface::SurfaceFlag;
 use srrf_args::words::count;
 use srrf_args::{Failure, Output, OutputKind, Places, files};
 
@@ -39,6 +40,9 @@ pub struct SkeletonArgs {
     read: ReadFlags,
 
     #[command(flatten)]
+    surface: SurfaceFlag,
+
+    #[command(flatten)]
     common: Common,
 }
 
@@ -54,10 +58,15 @@ pub fn run(args: &SkeletonArgs) -> Result<ExitCode, Failure> {
     let places = Places::new().reads("the cloud", &*args.input).reads("--weights", weights);
     places.writes("--output", &**output, OutputKind::PLY)?.check()?;
     args.common.threads.start()?;
-    let input = files::read_solid(&args.input, None, args.read.options())?;
+    let progress = args.common.progress();
+    progress.step(format!("reading {:?}", args.input));
+    let mut input = files::read_solid(&args.input, None, args.read.options())?;
+    let drawn = args.surface.draw_alone(&mut input, 0)?;
+    progress.step(format!("finding the skeleton of {:?}", input.name));
     let found = srrf::skeleton(&input.cloud, args.weights.weights.as_deref(), &args.device.device)
         .map_err(|e| failed(e, &input.name, &input.name))?;
     files::write(output, to_ply(&found).as_bytes())?;
+    progress.clear();
     let out = Output::new(args.common.quiet.quiet, files::is_stream(output));
     out.say(&format!(
         "wrote {}: {} spheres of {}, by {}",
@@ -66,6 +75,7 @@ pub fn run(args: &SkeletonArgs) -> Result<ExitCode, Failure> {
         input.name,
         found.weights
     ));
+    drawn.iter().for_each(|drawn| out.say(&format!("{} is {}", input.name, drawn.text())));
     for warning in warnings_of(&input) {
         out.say(&format!("warning: {warning}"));
     }

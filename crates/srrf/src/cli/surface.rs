@@ -4,8 +4,8 @@ use clap::Args;
 use srrf::{Counterpart, DrawnSurface, SurfaceDraw};
 use srrf_args::Failure;
 use srrf_args::files::Input;
-use srrf_args::words::{count, counted, length};
-use srrf_cloud::{MeshError, PointCloud, TriangleMesh};
+use srrf_args::surface::{self, DrawnHow, mesh};
+use srrf_cloud::{PointCloud, TriangleMesh};
 
 /// How meshes become clouds.
 #[derive(Debug, Clone, Copy, Args)]
@@ -17,21 +17,12 @@ pub struct SurfaceArgs {
 
 /// What was made of a mesh, in words.
 pub fn text(drawn: &DrawnSurface) -> String {
-    let vertices = count(drawn.vertices);
-    let left_out = match drawn.faces_left_out {
-        0 => String::new(),
-        n => format!("; {} without an area passed over", counted(n, "face")),
-    };
     let how = match drawn.draw {
-        None => format!("its {vertices} vertices are the cloud, as asked"),
-        Some(SurfaceDraw::Vertices) => format!("its {vertices} vertices lie dense enough and are the cloud"),
-        Some(SurfaceDraw::Surface { points, spacing }) => format!(
-            "{} points drawn from its surface, {} apart; --vertices takes its {vertices} vertices",
-            count(points),
-            length(spacing, 2),
-        ),
+        None => DrawnHow::Asked,
+        Some(SurfaceDraw::Vertices) => DrawnHow::Dense,
+        Some(SurfaceDraw::Surface { points, spacing }) => DrawnHow::Points(points, spacing),
     };
-    format!("a mesh of {}: {how}{left_out}", counted(drawn.faces, "face"))
+    surface::text(drawn.vertices, drawn.faces, drawn.faces_left_out, how)
 }
 
 impl SurfaceArgs {
@@ -120,26 +111,6 @@ impl SurfacePlan {
         }
         self.drawn
     }
-}
-
-/// The surface of a mesh; none of a cloud, and where the vertices are asked for.
-fn mesh(input: &Input, vertices: bool) -> Result<Option<TriangleMesh>, Failure> {
-    if vertices || input.faces.len() + input.lost_faces == 0 {
-        return Ok(None);
-    }
-    let made = if input.faces.is_empty() {
-        Err(MeshError::NoArea { faces: input.lost_faces })
-    } else {
-        TriangleMesh::new(input.cloud.points(), &input.faces)
-    };
-    made.map(Some).map_err(|error: MeshError| {
-        let points = count(input.cloud.len());
-        let message = format!(
-            "{:?}: {error}; mend the mesh, or take its {points} vertices as a cloud with --vertices",
-            input.name
-        );
-        Failure::usage(message).because(error)
-    })
 }
 
 #[cfg(test)]

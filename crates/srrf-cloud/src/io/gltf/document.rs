@@ -1,7 +1,6 @@
 //! A glTF file as its parts: the JSON, and the bytes of its buffers.
 
 use std::borrow::Cow;
-use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use base64::Engine;
@@ -9,8 +8,9 @@ use base64::engine::general_purpose::STANDARD;
 use gltf::binary::Glb;
 use gltf::json::{Root, deserialize};
 
+use super::super::file::read_file;
 use super::super::scan::quote;
-use super::super::{FormatError, ReadOptions};
+use super::super::{FormatError, IoError, ReadOptions};
 
 /// The parts of a file.
 pub(super) struct GltfParts<'a> {
@@ -171,9 +171,12 @@ fn resolve(uri: &str, options: &ReadOptions) -> Result<Cow<'static, [u8]>, Forma
             "the buffer {shown} is a link out of the folder of the file; only files there are read"
         ))
     })?;
-    let length = fs::metadata(&path).map_err(unread)?.len();
-    options.check_memory("the buffers", 0, usize::try_from(length).unwrap_or(usize::MAX))?;
-    fs::read(&path).map(Cow::Owned).map_err(unread)
+    match read_file(&path, options) {
+        Ok(bytes) => Ok(Cow::Owned(bytes)),
+        Err(IoError::Format { source, .. }) => Err(source),
+        Err(IoError::Read { source, .. }) => Err(unread(source)),
+        Err(other) => Err(content(format!("the buffer {shown} cannot be read: {other}"))),
+    }
 }
 
 /// Whether a file, its links followed, is inside a folder.

@@ -239,3 +239,25 @@ fn what_is_not_supported_or_damaged() {
     let refused = Mcap.write_cloud(&Outgoing::of_points(&[[0.0; 3]]), &mut out).unwrap_err().to_string();
     assert!(refused.contains(".pcd"));
 }
+
+/// A chunk that says that it unpacks to 1 TB.
+#[test]
+fn claims_of_chunks_are_checked() {
+    let message = Ros::message(&cloud(0.0), false, true);
+    for compression in [Compression::Lz4, Compression::Zstd] {
+        let mut bytes = file(&[("/p", ROS2, "cdr", vec![message.clone()])], Some(compression));
+        assert_eq!(read(&bytes, &default()).unwrap().points.len(), 2);
+        // Behind the magic number comes the header: its kind, its length, its content. Then the chunk: its kind, its
+        // length, two times, and the size.
+        let length = u64::from_le_bytes(*bytes[9..].first_chunk().unwrap()) as usize;
+        let chunk = 8 + 9 + length;
+        assert_eq!(bytes[chunk], mcap::records::op::CHUNK);
+        let size = chunk + 9 + 16;
+        bytes[size..size + 8].copy_from_slice(&(1u64 << 40).to_le_bytes());
+        let error = read(&bytes, &default()).unwrap_err().to_string();
+        assert!(error.contains("MCAP"), "{error}");
+    }
+    let bytes = file(&[("/p", ROS2, "cdr", vec![message])], None);
+    let limited = ReadOptions { max_memory: Some(50), ..default() };
+    assert!(read(&bytes, &limited).is_err(), "no record may be longer than the memory that is allowed");
+}

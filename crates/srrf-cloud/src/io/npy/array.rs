@@ -48,6 +48,18 @@ impl Array {
         Ok(Self { shape, values })
     }
 
+    /// How many numbers the bytes of a `.npy` file hold, as far as its header and its length go together.
+    ///
+    /// # Errors
+    /// [`FormatError`] where the bytes have no header of an array of numbers.
+    pub(in crate::io) fn numbers(bytes: &[u8]) -> Result<usize, FormatError> {
+        let header = NpyHeader::parse(bytes)?;
+        Ok(match header.descr {
+            Descr::Plain(kind) => (bytes.len() - header.body) / kind.scalar.size(),
+            Descr::Fields(_) => 0,
+        })
+    }
+
     /// Writes `values` of `shape` as a `.npy` file of `float64`.
     ///
     /// # Errors

@@ -27,9 +27,14 @@ struct Magic<'a> {
     rest: &'a [u8],
 }
 
-/// Whether a line begins as an OFF file does.
+/// Whether a line begins as an OFF file does: with the word, and nothing or a count behind it.
 pub(super) fn is_magic(text: &[u8]) -> bool {
-    magic(text).is_some()
+    magic(text).is_some_and(|magic| {
+        let ends = magic.rest.first().is_none_or(|byte| byte.is_ascii_whitespace() || byte.is_ascii_digit());
+        let rest = magic.rest.trim_ascii_start();
+        let binary = rest.get(..6).is_some_and(|word| word.eq_ignore_ascii_case(b"BINARY"));
+        ends && (binary || rest.first().is_none_or(u8::is_ascii_digit))
+    })
 }
 
 /// The letters may be `ST`, `C`, `N`, `4`, `n` in any order, all in capitals or all small but for `n`.

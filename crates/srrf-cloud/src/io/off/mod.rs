@@ -302,7 +302,12 @@ mod tests {
             let error = read(text).unwrap_err().to_string();
             assert!(error.contains(fact), "{text:?}: {error}");
         }
-        assert!(Off.recognises(b"# by hand\n off\n") && !Off.recognises(b"1 2 3\n4 5 6\n"));
+        for text in ["# by hand\n off\n", "OFF4 2 0\n", "OFF BINARY\n", "STCN4nOFF 3\n"] {
+            assert!(Off.recognises(text.as_bytes()), "{text}");
+        }
+        for text in ["1 2 3\n4 5 6\n", "offset x y z\n1 2 3 4\n", "coffee\n", "off x y\n"] {
+            assert!(!Off.recognises(text.as_bytes()), "{text}");
+        }
     }
 
     #[test]

@@ -58,6 +58,9 @@ impl CloudFormat for Parquet {
         let table = Table::open(bytes, options)?;
         let place = columns::find(table.metadata.schema(), options.columns.as_ref())?;
         let coordinates = place.roots();
+        let columns = table.metadata.schema().fields().len().saturating_sub(coordinates.len());
+        let planned = table.rows().saturating_mul(16).saturating_mul(columns);
+        options.check_memory("the attributes", 2 * bytes.len(), planned)?;
         let mut attributes = Vec::new();
         for (column, field) in table.metadata.schema().fields().iter().enumerate() {
             let kind = match field.data_type() {
@@ -117,6 +120,14 @@ impl CloudFormat for Parquet {
         }
         out.write_all(&write::rewritten(&table, options, &place, &points, motion)?)
     }
+}
+
+/// Checks what a Parquet file of any columns unpacks to, before it is read by other means.
+///
+/// # Errors
+/// [`FormatError`] where the file is damaged, or unpacks to more than is in proportion or allowed.
+pub fn check_parquet(bytes: &[u8], options: &ReadOptions) -> Result<(), FormatError> {
+    Table::open(bytes, options)?.check_all(options)
 }
 
 #[cfg(test)]

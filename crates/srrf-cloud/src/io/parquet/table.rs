@@ -83,6 +83,12 @@ impl Table {
         Ok(())
     }
 
+    /// As [`check`](Self::check), of all columns.
+    pub fn check_all(&self, options: &ReadOptions) -> Result<(), FormatError> {
+        let all: Vec<usize> = (0..self.metadata.schema().fields().len()).collect();
+        self.check(&all, options)
+    }
+
     /// Checks what the columns unpack to before any memory is taken for it.
     fn check(&self, roots: &[usize], options: &ReadOptions) -> Result<(), FormatError> {
         let size = self.bytes.len() as u64;

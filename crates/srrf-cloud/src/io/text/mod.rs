@@ -213,8 +213,10 @@ fn parse<E: From<FormatError>>(
             continue;
         }
         if rows == 0 {
-            // Spreadsheets leave rows without anything, and may say first what separates.
-            if title::is_blank(trimmed) || (line.number == 1 && title::says_separator(trimmed)) {
+            // Spreadsheets leave rows without anything above the title, and may say first what separates.
+            if (heads.title.is_none() && title::is_blank(trimmed))
+                || (line.number == 1 && title::says_separator(trimmed))
+            {
                 continue;
             }
             if parsed.announced.is_none()

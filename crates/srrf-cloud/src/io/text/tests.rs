@@ -111,6 +111,7 @@ fn empty_cells_are_points_that_are_not_there() {
         ("x y z\n1 2 3\n4 \"\" 6\n7 8 9\n", 1),
         ("x,y,z\n1,2,3\nNA,5,6\n4,#N/A,6\n#VALUE!,NULL,None\n7,8,9\n", 3),
         (",x,y,z\n0,1,2,3\n1,,,\n2,7,8,9\n", 1),
+        (",,\nx,y,z\n,,\n1,2,3\n7,8,9\n", 1),
     ] {
         let mut contents = Text.read(text.as_bytes(), &ReadOptions::default()).unwrap();
         assert_eq!(contents.drop_not_finite(), missing, "{text:?}");

@@ -10,9 +10,9 @@ use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use flate2::read::ZlibDecoder;
 
-use super::super::FormatError;
 use super::super::scalar::Scalar;
 use super::super::scan::{number, words};
+use super::super::{FormatError, ReadOptions};
 
 /// Packed arrays may be this many times larger than their bytes in the file, and `SLACK` more.
 const RATIO: usize = 200;
@@ -31,6 +31,9 @@ pub(super) struct Storage<'a> {
     /// Numbers that may still be read: arrays can share their bytes, so that few bytes could ask for any
     /// number of them.
     pub budget: Cell<usize>,
+    /// How much memory may be taken, beside the bytes of the file.
+    pub options: &'a ReadOptions,
+    pub held: usize,
 }
 
 /// The numbers of text.
@@ -61,7 +64,7 @@ impl Storage<'_> {
             return self.base64(bytes, kind);
         }
         let word = if self.long { 8 } else { 4 };
-        let count = if self.zipped { 3 + self.words(bytes, 1)?[0] } else { 1 };
+        let count = if self.zipped { self.words(bytes, 1)?[0].saturating_add(3) } else { 1 };
         let length = count.checked_mul(word).filter(|&length| length <= bytes.len());
         let length = length.ok_or_else(|| short("a header", bytes.len()))?;
         let header = self.words(bytes, count)?;
@@ -105,6 +108,10 @@ impl Storage<'_> {
     }
 
     fn numbers(&self, header: &[usize], bytes: &[u8], kind: Scalar) -> Result<Vec<f64>, FormatError> {
+        // Unpacked, and as numbers.
+        let size = if self.zipped { unpacked_size(header) } else { header.first().copied().unwrap_or(0) };
+        let bytes_of = |packed: usize| packed.saturating_add((size / kind.size()).saturating_mul(8));
+        self.options.check_memory("an array", self.held, bytes_of(if self.zipped { size } else { 0 }))?;
         let bytes = if self.zipped {
             Cow::Owned(unpacked(header, bytes)?)
         } else {
@@ -138,6 +145,13 @@ fn decoded(text: &[u8], size: usize) -> Result<Vec<u8>, FormatError> {
     }
     bytes.truncate(size);
     Ok(bytes)
+}
+
+/// Bytes of the blocks of a header, unpacked.
+fn unpacked_size(header: &[usize]) -> usize {
+    let [_, size, last, packed @ ..] = header else { return 0 };
+    let whole = if *last > 0 { packed.len().saturating_sub(1) } else { packed.len() };
+    whole.saturating_mul(*size).saturating_add(if packed.is_empty() { 0 } else { *last })
 }
 
 /// Unpacks blocks: the header is their number, the size of each, that of the last, and the sizes of

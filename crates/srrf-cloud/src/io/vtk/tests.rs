@@ -329,3 +329,29 @@ fn moved_copies_keep_the_rest() {
         assert!((0..3).all(|axis| (normal[axis] - expected[axis]).abs() < 1e-6), "{normal:?}");
     }
 }
+
+/// Few bytes that say that they unpack to many are refused before any of them is.
+#[test]
+fn claims_of_packed_arrays_are_checked() {
+    let file = |size: u32, blocks: u32| {
+        let mut zip = ZlibEncoder::new(Vec::new(), Compression::default());
+        zip.write_all(&[0; 36]).unwrap();
+        let block = zip.finish().unwrap();
+        let header = [blocks, size, 0, block.len() as u32].map(u32::to_le_bytes).concat();
+        let mut bytes = b"<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" \
+            compressor=\"vtkZLibDataCompressor\"><PolyData><Piece NumberOfPoints=\"3\"><Points>\
+            <DataArray type=\"Float32\" Name=\"Points\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>\
+            </Points></Piece></PolyData><AppendedData encoding=\"raw\">_"
+            .to_vec();
+        bytes.extend([header, block].concat());
+        bytes.extend(b"</AppendedData></VTKFile>");
+        bytes
+    };
+    assert_eq!(points_of(&VTP, &file(36, 1)).unwrap(), [[0.0; 3]; 3]);
+    let limited = ReadOptions { max_memory: Some(1 << 20), ..ReadOptions::default() };
+    let huge = VTP.read(&file(4_000_000_000, 1), &limited).unwrap_err();
+    assert!(matches!(huge, FormatError::Memory { needed: 12_000_000_000.., limit: 1_048_576, .. }), "{huge}");
+    for (size, blocks) in [(u32::MAX, 1), (36, u32::MAX), (1 << 30, 1)] {
+        assert!(points_of(&VTP, &file(size, blocks)).is_err(), "{size} {blocks}");
+    }
+}

@@ -149,6 +149,8 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, what: What) -> Result<Xm
         appended,
         appended_base64: encoding == Some("base64"),
         budget: budget(bytes.len(), zipped),
+        options,
+        held: bytes.len(),
     };
     let body = child(root, kind).ok_or_else(|| FormatError::truncated(format!("a {kind}"), "none"))?;
     let mut file = Xml { single: true, ..Xml::default() };

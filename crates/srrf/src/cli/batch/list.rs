@@ -2,7 +2,6 @@
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
@@ -11,6 +10,7 @@ use super::csv;
 use super::pair::{COLUMNS, ListedPair, Record};
 use super::parquet_list;
 use srrf_args::{Failure, Places};
+use srrf_cloud::io::{IoError, ReadOptions, check_parquet, read_file};
 
 /// The pairs of a batch.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,8 +26,8 @@ impl PairList {
     ///
     /// # Errors
     /// [`Failure::usage`], which names the file and the line.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
-        let records = records(path)?;
+    pub fn read(path: &Path, options: &ReadOptions) -> Result<Self, Failure> {
+        let records = records(path, options)?;
         let rows = pairs(records).map_err(|problem| Failure::usage(format!("{path:?}: {problem}")))?;
         Ok(Self { rows, folder: path.parent().map(Path::to_owned).unwrap_or_default() })
     }
@@ -54,22 +54,21 @@ impl PairList {
 ///
 /// # Errors
 /// [`Failure::usage`], which names the file and the line.
-pub(super) fn records(path: &Path) -> Result<Vec<Record>, Failure> {
-    let cannot = |e: std::io::Error| {
-        Failure::usage(format!("cannot read {path:?}: {e}; it should be a table: CSV, JSON lines or Parquet"))
-    };
-    let mut file = File::open(path).map_err(cannot)?;
-    let mut begin = Vec::new();
-    (&mut file).take(4).read_to_end(&mut begin).map_err(cannot)?;
-    file.rewind().map_err(cannot)?;
+pub(super) fn records(path: &Path, options: &ReadOptions) -> Result<Vec<Record>, Failure> {
+    let bytes = read_file(path, options).map_err(|error| match error {
+        IoError::Read { source, .. } => Failure::usage(format!(
+            "cannot read {path:?}: {source}; it should be a table: CSV, JSON lines or Parquet"
+        )),
+        other => other.into(),
+    })?;
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let rows = if begin == b"PAR1" {
-        parquet_list::records(file)
+    let rows = if bytes.starts_with(b"PAR1") {
+        // What it unpacks to is checked before any of it is.
+        check_parquet(&bytes, options).map_err(|e| Failure::usage(format!("{path:?}: {e}")))?;
+        File::open(path).map_err(|e| e.to_string()).and_then(parquet_list::records)
     } else if extension == "parquet" {
         Err("it is no Parquet file; was it written whole?".into())
     } else {
-        let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes).map_err(cannot)?;
         if matches!(&*extension, "jsonl" | "ndjson" | "json") {
             json_lines(&bytes)
         } else {
@@ -229,5 +228,18 @@ mod tests {
         assert!(lines("{\"source\":\"a\"}\n").contains("columns are [\"source\"]"));
         assert!(lines("[1]\n").starts_with("line 1: not an object"));
         assert!(lines("{\"source\":[1],\"target\":\"b\"}\n").contains("`source` is [1]"));
+    }
+
+    #[test]
+    fn memory_is_bounded() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pairs.csv");
+        let rows: String = (0..100).map(|i| format!("a{i}.ply,b{i}.ply\n")).collect();
+        std::fs::write(&path, format!("source,target\n{rows}")).unwrap();
+        let read =
+            |bytes| PairList::read(&path, &ReadOptions { max_memory: Some(bytes), ..ReadOptions::default() });
+        let error = read(1000).unwrap_err().to_string();
+        assert!(error.contains("pairs.csv") && error.contains("--max-memory"), "{error}");
+        assert_eq!(read(10_000).unwrap().rows.len(), 100);
     }
 }

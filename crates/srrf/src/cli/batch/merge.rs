@@ -10,6 +10,7 @@ use srrf_args::{Failure, Output, OutputLock, Places};
 
 use super::list::PairList;
 use super::{RESULTS, results};
+use srrf_cloud::io::ReadOptions;
 
 /// Join results of several runs: each pair once; the extension of the output says the format.
 ///
@@ -43,7 +44,8 @@ pub fn merge(args: &MergeArgs) -> Result<ExitCode, Failure> {
     }
     places.writes("--output", &*args.output, RESULTS)?.check()?;
     let _lock = OutputLock::take(&args.output)?;
-    let listed = args.order.as_deref().map(PairList::read).transpose()?;
+    let listed =
+        args.order.as_deref().map(|order| PairList::read(order, &ReadOptions::default())).transpose()?;
     let ids: Vec<&str> = listed.iter().flat_map(|list| &list.rows).map(|pair| &*pair.id).collect();
     let pairs = results::join(&args.results, &ids, &args.output)?;
     let out = Output::new(args.quiet.quiet, false);
