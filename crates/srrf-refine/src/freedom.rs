@@ -52,6 +52,18 @@ pub struct Freedom {
     pub least_margin: f64,
 }
 
+impl Freedom {
+    /// Share of all that is open that lies near the pose: 1 where nothing is.
+    pub fn certain_share(&self) -> f64 {
+        self.open.iter().map(|motion| motion.certain_share).product()
+    }
+
+    /// [`Self::certain_share`] of the unbounded motions alone.
+    pub fn unbounded_share(&self) -> f64 {
+        self.open.iter().filter(|motion| motion.unbounded).map(|motion| motion.certain_share).product()
+    }
+}
+
 /// How much the shares of a pose speak against those of another one, whose points are as many.
 pub(crate) fn margin(found: &Shares, moved: &Shares, trials: [f64; 2]) -> f64 {
     let one = |side: usize, scale: usize| {

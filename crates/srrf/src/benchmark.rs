@@ -43,7 +43,7 @@ impl From<Error> for RegisterError {
 
 #[cfg(test)]
 mod tests {
-    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
     use srrf_cloud::{EulerXyz, PointCloud, Rigid};
     use srrf_corrupt::{datasets::ShapeSource, shapes::ProceduralShapes};
 
@@ -80,8 +80,10 @@ mod tests {
         let given = Registrar::new(Options { method: Method::Given, ..Options::default() }).unwrap();
         let row: &dyn Register = &given;
         assert_eq!(row.name(), "srrf-register");
-        let far = Rigid { rotation: EulerXyz::from_deg([0.0, 0.0, 170.0]).to_matrix(), ..Rigid::identity() };
-        assert!(row.register(&shape(), &shape().transformed(&far)).unwrap().certainty.unwrap().abstain);
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let ball = (0..601).map(|_| std::array::from_fn(|_| rng.random_range(-0.5..0.5))).collect();
+        let other = PointCloud::new(ball).unwrap();
+        assert!(row.register(&shape(), &other).unwrap().certainty.unwrap().abstain);
         let line = PointCloud::new((0..5).map(|i| [f64::from(i), 0.0, 0.0]).collect()).unwrap();
         assert!(matches!(row.register(&line, &shape()), Err(RegisterError::Source(_))));
         assert!(matches!(row.register(&shape(), &line), Err(RegisterError::Target(_))));

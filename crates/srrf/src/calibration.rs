@@ -22,7 +22,7 @@ pub enum CalibrationError {
     },
 }
 
-/// Logistic regression on the features and their squares.
+/// Logistic regression on the features, their squares and their products in pairs.
 ///
 /// Fitted by `cargo run -p srrf-calibrate --bin calibrate` on pairs made from training shapes and
 /// built-in shapes, and public scans, none of which any test uses; the file holds what it was fitted on.
@@ -166,6 +166,7 @@ mod tests {
             log_false_alarms: -100.0,
             least_margin: 100.0,
             certain_share: 1.0,
+            unbounded_share: 1.0,
             share_of_poses: 1.0,
             challenger: 0.3,
             chance_share: 0.05,
@@ -185,6 +186,7 @@ mod tests {
             log_false_alarms: -30.0,
             least_margin: 0.1,
             certain_share: 0.02,
+            unbounded_share: 0.02,
             share_of_poses: 1.0,
             chance_share: 0.05,
             ..Features::default()
@@ -204,6 +206,7 @@ mod tests {
             log_false_alarms: -20.0,
             least_margin: 0.1,
             certain_share: 0.02,
+            unbounded_share: 0.02,
             share_of_poses: 1.0,
             chance_share: 0.03,
             ..Features::default()

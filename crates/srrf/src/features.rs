@@ -45,6 +45,8 @@ pub struct Features {
     pub least_margin: f64,
     /// Share of what the fit leaves open that lies near the pose: 1 where it determines all six motions.
     pub certain_share: f64,
+    /// The same of the motions alone that go on for as far as was tried, along which any place is as likely: 1 where there are none.
+    pub unbounded_share: f64,
     /// Weight of the pose among all that fit as well: 1 where it is the only one.
     pub share_of_poses: f64,
     /// Rank of the best pose that a symmetry of the clouds, a shift or another start leads to, over that of this one; at most 2.
@@ -100,7 +102,8 @@ impl Features {
             rank,
             log_false_alarms: assessment.chance.log_false_alarms.clamp(-LIMIT, LIMIT),
             least_margin: assessment.freedom.least_margin.min(LIMIT),
-            certain_share: assessment.freedom.open.iter().map(|motion| motion.certain_share).product(),
+            certain_share: assessment.freedom.certain_share(),
+            unbounded_share: assessment.freedom.unbounded_share(),
             challenger: alternatives.iter().map(|a| a.rank).fold(0.0, f64::max).min(2.0),
             chance_share: 0.5 * (assessment.chance.share_source + assessment.chance.share_target),
             affine_gain: assessment.affine.map_or(0.0, |fit| fit.gain),
@@ -131,16 +134,22 @@ impl Features {
         ]
     }
 
-    /// The features with their squares.
+    /// The features, their squares and their products in pairs.
     pub(crate) fn expanded(&self) -> Vec<f64> {
         let x = self.values();
         // NaN must not hide behind a largest or least value.
-        let all =
-            [self.rival_support, self.challenger, self.least_margin, self.share_of_poses, self.certain_share];
-        if all.iter().any(|v| v.is_nan()) {
-            return vec![f64::NAN; 2 * x.len()];
-        }
-        x.iter().copied().chain(x.iter().map(|v| v * v)).collect()
+        let all = [
+            self.rival_support,
+            self.challenger,
+            self.least_margin,
+            self.share_of_poses,
+            self.certain_share,
+            self.unbounded_share,
+        ];
+        let nan = all.iter().any(|v| v.is_nan());
+        let squares = x.iter().map(|v| v * v);
+        let products = (0..x.len()).flat_map(|i| (i + 1..x.len()).map(move |j| x[i] * x[j]));
+        x.iter().copied().chain(squares).chain(products).map(|v| if nan { f64::NAN } else { v }).collect()
     }
 }
 
@@ -208,6 +217,7 @@ mod tests {
             "log_false_alarms",
             "least_margin",
             "certain_share",
+            "unbounded_share",
             "share_of_poses",
             "challenger",
             "chance_share",
@@ -219,7 +229,7 @@ mod tests {
         .map(|(i, name)| ((*name).to_owned(), (i as f64).into()))
         .collect();
         let features: Features = serde_json::from_value(numbered.into()).unwrap();
-        let logarithms = [13f64.ln(), 12f64.ln()];
+        let logarithms = [14f64.ln(), 12f64.ln()];
         let want = [
             0.0,
             1.0,
@@ -228,17 +238,20 @@ mod tests {
             4.0,
             5.0,
             8.0,
-            15.0,
+            16.0,
             0.1,
             0.11f64.sqrt(),
-            16.0,
             17.0,
+            18.0,
             2.0,
             logarithms[0],
             logarithms[1],
         ];
         assert_eq!(features.values(), want);
-        assert_eq!((features.expanded().len(), features.expanded()[15 + 6]), (30, 64.0));
+        let all = features.expanded();
+        assert_eq!((all.len(), all[15 + 6]), (15 + 15 + 15 * 14 / 2, 64.0));
+        // The products begin with that of the first two, and end with that of the last two.
+        assert_eq!((all[30 + 14], all[all.len() - 1]), (2.0, logarithms[0] * logarithms[1]));
         assert!(Features { challenger: f64::NAN, ..features }.expanded()[0].is_nan());
     }
 }

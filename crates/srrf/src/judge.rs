@@ -61,12 +61,15 @@ impl Judge {
     }
 }
 
-/// Ends of what is open fit worst, and are seldom where the truth is: the share near the pose counts so many times.
-const ENDS: f64 = 4.0;
+/// The most that [`Judge::judge`] says of such features, whatever the regression says.
+pub fn ceiling(features: &Features) -> f64 {
+    beyond_chance(features.log_false_alarms).min(allowed(features))
+}
 
-/// What open motions and other poses that fit as well allow to be sure of, in [0, 1].
+/// What endless motions and other poses that fit as well allow to be sure of, in [0, 1]. A motion that ends somewhere fits worst there, and
+/// the truth is seldom at an end: how much it counts is for the regression to say.
 fn allowed(features: &Features) -> f64 {
-    features.share_of_poses.min(ENDS * features.certain_share).min(1.0)
+    features.share_of_poses.min(features.unbounded_share).min(1.0)
 }
 
 /// The probability that clouds with so many false alarms, of which this is the logarithm, do not agree by chance.
@@ -93,6 +96,7 @@ mod tests {
             log_false_alarms: -100.0,
             least_margin: 100.0,
             certain_share: 1.0,
+            unbounded_share: 1.0,
             share_of_poses: 1.0,
             ..Features::default()
         }
@@ -117,7 +121,7 @@ mod tests {
         let judge = Judge::new(&Options::default()).unwrap();
         let judged = |features: Features| judge.judge(&features).probability.get();
         let sure = judged(good());
-        assert!(judged(Features { certain_share: 0.05, ..good() }) <= 0.2);
+        assert!(judged(Features { unbounded_share: 0.05, ..good() }) <= 0.05);
         assert!(judged(Features { share_of_poses: 0.25, ..good() }) <= 0.25);
         assert_eq!(judged(Features { log_false_alarms: 0.5, ..good() }), 0.0);
         let coin = judged(Features { log_false_alarms: 0.5f64.ln(), ..good() });

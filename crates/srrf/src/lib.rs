@@ -62,7 +62,7 @@ pub use coarse::CoarsePose;
 pub use error::{Error, NoPose};
 pub use event::{Event, Observed, Observer};
 pub use features::Features;
-pub use judge::{Judge, Judgement};
+pub use judge::{Judge, Judgement, ceiling};
 pub use network::WeightsId;
 pub use options::{Method, Options, OptionsError, RotationRange};
 pub use outcome::{Outcome, PointCounts, TriedStart};

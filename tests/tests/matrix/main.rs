@@ -104,11 +104,13 @@ fn swapped_clouds_give_the_inverse() {
 fn the_order_of_the_points_does_not_matter() {
     let (source, target) = pair();
     let (other_source, other_target) = (reordered(&source, 77), reordered(&target, 200));
-    let gaps = cases().iter().map(|case| {
-        (case.name, gap(&pose(case, &source, &target), &pose(case, &other_source, &other_target)))
-    });
-    // In single precision; equi-gspr sums over neighbours in the order of the points.
-    all_within(4e-3, gaps);
+    let moved: Vec<_> = cases()
+        .iter()
+        .map(|case| (case, gap(&pose(case, &source, &target), &pose(case, &other_source, &other_target))))
+        .filter(|(case, gap)| gap.is_nan() || *gap > case.promise.moved_by_order)
+        .map(|(case, gap)| (case.name, gap))
+        .collect();
+    assert!(moved.is_empty(), "{moved:?}");
 }
 
 #[test]

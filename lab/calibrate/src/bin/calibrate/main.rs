@@ -7,7 +7,8 @@
 //! of ModelNet40's training split that the network was validated on; `--scenes` adds the public scans of a table
 //! (`name,source,target,pose,kind`), every other one for measuring only. No test shape is looked at.
 //! The answers are kept in the folder of `--cache`, so that a fit takes seconds; remove it where the program changed.
-//! `--write` replaces `crates/srrf/src/calibration.json`, `--book DIR` writes the page of the book.
+//! `--write` replaces `crates/srrf/src/calibration.json`. After building again, `--measure` asks the pairs to measure alone, in a new
+//! folder, and `--book DIR` writes what the program says of them into the book.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program that prints")]
 
 mod pairs;
@@ -23,7 +24,7 @@ use std::sync::Mutex;
 use clap::Parser;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use srrf::{Features, Judge, Logistic, Options, Registrar, Request};
+use srrf::{Features, Judge, Logistic, Options, Registrar, Request, ceiling};
 use srrf_cloud::is_right;
 use srrf_corrupt::datasets::{Split, open};
 use srrf_corrupt::shapes::ProceduralShapes;
@@ -44,14 +45,17 @@ struct Arguments {
     /// Tables of scan pairs
     #[arg(long)]
     scenes: Vec<PathBuf>,
+    /// Ask the pairs to measure alone, and fit nothing
+    #[arg(long, conflicts_with = "write")]
+    measure: bool,
     /// Folder for the page of the book
-    #[arg(long)]
+    #[arg(long, requires = "measure")]
     book: Option<PathBuf>,
     /// Replace the calibration in the program
     #[arg(long)]
     write: bool,
     /// Penalty on the squares of the weights
-    #[arg(long, default_value_t = 3.0)]
+    #[arg(long, default_value_t = 10.0)]
     ridge: f64,
 }
 
@@ -74,35 +78,40 @@ fn main() {
     let arguments = Arguments::parse();
     let examples = examples(&arguments);
     let (held_out, fitted): (Vec<&Example>, Vec<&Example>) = examples.iter().partition(|e| e.held_out);
+    let page = report::tables(&held_out, |e| e.probability);
+    println!("what the program says, held out:\n{page}");
+    if arguments.measure {
+        return arguments.book.iter().for_each(|book| write_page(book, held_out.len(), &page));
+    }
+    // What is answered by the ceiling says nothing of the regression.
+    let free = fitted.iter().filter(|e| ceiling(&e.features) >= 0.5);
+    let of_fit: Vec<(Features, bool)> = free.map(|e| (e.features, e.right)).collect();
     let what = format!(
         "{} answers, seed {}: built-in shapes{}{}; 12 corruptions, clean, cropped and seen from one side, few and unrelated points, scales apart; \
          methods auto, given and fpfh-ransac",
-        fitted.len(),
+        of_fit.len(),
         SEEDS[0],
         if arguments.modelnet.is_some() { ", validation shapes of ModelNet40's training split" } else { "" },
         if arguments.scenes.is_empty() { "" } else { ", public scans" },
     );
-    let of_fit: Vec<(Features, bool)> = fitted.iter().map(|e| (e.features, e.right)).collect();
-    let model = Logistic::fit(&of_fit, arguments.ridge, what.clone()).unwrap();
+    let model = Logistic::fit(&of_fit, arguments.ridge, what).unwrap();
     let says = |e: &Example| Judge::with(model.clone()).judge(&e.features).probability.get();
-
-    println!("what the program says, held out:\n{}", report::tables(&held_out, |e| e.probability));
     println!("the new fit, on what it was fitted on:\n{}", report::tables(&fitted, says));
-    let page = report::tables(&held_out, says);
-    println!("the new fit, held out:\n{page}");
+    println!("the new fit, held out:\n{}", report::tables(&held_out, says));
     if arguments.write {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../crates/srrf/src/calibration.json");
         fs::write(&path, serde_json::to_string_pretty(&model).unwrap() + "\n").unwrap();
     }
-    if let Some(book) = &arguments.book {
-        let text = format!(
-            "<!-- Written by `calibrate --book`: what is changed here by hand is lost. -->\n\n# Reliability by kind\n\nFitted on {what}. Measured \
-             on {} others, of seed {} and other shapes.\n\n{page}",
-            held_out.len(),
-            SEEDS[1]
-        );
-        fs::write(book.join("calibration.md"), text).unwrap();
-    }
+}
+
+fn write_page(book: &Path, pairs: usize, page: &str) {
+    let fitted_on = Logistic::embedded().unwrap().fitted_on;
+    let text = format!(
+        "<!-- Written by `calibrate --measure --book`: what is changed here by hand is lost. -->\n\n# Reliability by kind\n\nThe regression was \
+         fitted on {fitted_on}.\n\nBelow is what the program says of {pairs} others, of seed {} and other shapes.\n\n{page}",
+        SEEDS[1]
+    );
+    fs::write(book.join("calibration.md"), text).unwrap();
 }
 
 /// The answers of all pairs, from the cache as far as they are there.
@@ -163,6 +172,7 @@ fn examples(arguments: &Arguments) -> Vec<Example> {
     // A quarter as many more to measure, among the others, so that a part of the whole has both.
     let numbers: Vec<(u64, usize)> = (0..arguments.pairs + arguments.pairs / 4)
         .map(|i| if i % 5 == 4 { (i / 5, 1) } else { (i - i / 5, 0) })
+        .filter(|(_, part)| *part == 1 || !arguments.measure)
         .collect();
     let mut all: Vec<Example> = numbers
         .into_par_iter()
@@ -172,7 +182,7 @@ fn examples(arguments: &Arguments) -> Vec<Example> {
         })
         .collect();
     for table in &arguments.scenes {
-        for scene in scenes::read(table).unwrap() {
+        for scene in scenes::read(table).unwrap().into_iter().filter(|s| s.held_out() || !arguments.measure) {
             let tries = (0..4).filter_map(|number| {
                 answer(format!("{} {number}", scene.name), scene.held_out(), &|| Some(scene.case(number)))
             });
