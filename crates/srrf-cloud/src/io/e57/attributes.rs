@@ -29,7 +29,7 @@ fn known(column: &RecordName) -> Option<&'static str> {
         RecordName::ReturnIndex => "return_index",
         RecordName::TimeStamp => "time_stamp",
         RecordName::Unknown { name, .. } => {
-            let axis = ["normalx", "normaly", "normalz"].iter().position(|n| name.eq_ignore_ascii_case(n))?;
+            let axis = ["normalX", "normalY", "normalZ"].iter().position(|n| name.eq_ignore_ascii_case(n))?;
             NORMALS[axis]
         }
         _ => return None,
