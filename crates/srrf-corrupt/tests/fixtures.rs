@@ -95,7 +95,7 @@ fn deterministic_cores_agree_within_rounding() {
 
     // Sums of 125 terms of size 1 at most.
     let mu = hashed_table(3, 0.5);
-    let bent: Vec<_> = points.iter().map(|p| distortion::deform(p, &mu)).collect();
+    let bent = distortion::deform(points, &mu);
     assert!(largest_difference(&bent, &expected.distortion) < 1e-14);
 
     // The systems have condition numbers 3e4 and 8e2, and the two sides solve different ones.

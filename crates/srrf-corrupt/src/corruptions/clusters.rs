@@ -47,14 +47,28 @@ pub fn split_nearest(
     if size >= pool.len() {
         return (pool.to_vec(), Vec::new());
     }
-    let key = |index: u32| -> (f64, u32) {
+    // Numbers that are not negative are in the order of their bits.
+    let squared = |&index: &u32| -> u64 {
         let p = &points[index as usize];
-        ((0..3).map(|c| (p[c] - centre[c]).powi(2)).sum(), index)
+        (0..3).map(|c| (p[c] - centre[c]).powi(2)).sum::<f64>().to_bits()
     };
-    let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-    let mut keys: Vec<(f64, u32)> = pool.iter().map(|&index| key(index)).collect();
-    let farthest = *keys.select_nth_unstable_by(size - 1, order).1;
-    pool.iter().partition(|&&index| order(&key(index), &farthest).is_le())
+    let distances: Vec<u64> = pool.iter().map(squared).collect();
+    let limit = *distances.clone().select_nth_unstable(size - 1).1;
+    // Of those that are as far as the last one, the first by index.
+    let nearer = distances.iter().filter(|d| **d < limit).count();
+    let mut ties: Vec<u32> =
+        pool.iter().zip(&distances).filter(|(_, d)| **d == limit).map(|(i, _)| *i).collect();
+    ties.sort_unstable();
+    let last = ties[size - 1 - nearer];
+    let (mut near, mut far) = (Vec::with_capacity(size), Vec::with_capacity(pool.len() - size));
+    for (&index, &distance) in pool.iter().zip(&distances) {
+        if distance < limit || (distance == limit && index <= last) {
+            near.push(index);
+        } else {
+            far.push(index);
+        }
+    }
+    (near, far)
 }
 
 #[cfg(test)]

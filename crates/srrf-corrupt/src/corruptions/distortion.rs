@@ -2,6 +2,7 @@
 
 use rand::{Rng, rngs::ChaCha8Rng};
 
+use super::blocks::{BlockMotion, LANES, Lane, move_all};
 use super::draws::in_cube;
 use super::lattice::{CONTROL_POINTS_PER_AXIS, Displacements};
 use crate::card::{Card, Family, Strength};
@@ -45,7 +46,7 @@ impl Corruption for Distortion {
     ) -> Result<Corrupted, CorruptError> {
         check_points(points, self.name(), 1)?;
         let displacements = draw_displacements(severity, rng);
-        Ok(Corrupted::moved(points.iter().map(|p| deform(p, &displacements)).collect()))
+        Ok(Corrupted::moved(deform(points, &displacements)))
     }
 }
 
@@ -54,30 +55,46 @@ pub fn draw_displacements<R: Rng>(severity: Severity, rng: &mut R) -> Displaceme
     std::array::from_fn(|_| in_cube(severity.of(&AMPLITUDE), rng))
 }
 
-/// The deformed point `p + side * sum_ijk B_i(u_x) B_j(u_y) B_k(u_z) mu_ijk` with
+/// The deformed points `p + side * sum_ijk B_i(u_x) B_j(u_y) B_k(u_z) mu_ijk` with
 /// `u = (p + 1) / 2`. Points outside the box `[-1, 1]^3` stay where they are.
-pub fn deform(point: &[f64; 3], displacements: &Displacements) -> [f64; 3] {
-    let u = point.map(|c| (c + 1.0) / BOX_SIDE);
-    if u.iter().any(|c| !(0.0..=1.0).contains(c)) {
-        return *point;
-    }
-    let [bx, by, bz] = u.map(bernstein);
-    let mut moved = *point;
-    for (i, x) in bx.iter().enumerate() {
-        for (j, y) in by.iter().enumerate() {
-            let row = (CONTROL_POINTS_PER_AXIS * i + j) * CONTROL_POINTS_PER_AXIS;
-            for (z, mu) in bz.iter().zip(&displacements[row..row + CONTROL_POINTS_PER_AXIS]) {
-                let weight = BOX_SIDE * x * y * z;
-                for c in 0..3 {
-                    moved[c] += weight * mu[c];
+pub fn deform(points: &[[f64; 3]], displacements: &Displacements) -> Vec<[f64; 3]> {
+    move_all(points, &FreeForm(displacements))
+}
+
+struct FreeForm<'a>(&'a Displacements);
+
+impl BlockMotion for FreeForm<'_> {
+    #[inline(always)]
+    fn apply(&self, block: &[Lane; 3]) -> [Lane; 3] {
+        const N: usize = CONTROL_POINTS_PER_AXIS;
+        let u = block.map(|coordinate| coordinate.map(|c| (c + 1.0) / BOX_SIDE));
+        // The polynomials of each axis, at each point.
+        let [bx, by, bz]: [[Lane; N]; 3] = std::array::from_fn(|axis| {
+            let at = u[axis].map(bernstein);
+            std::array::from_fn(|i| std::array::from_fn(|l| at[l][i]))
+        });
+        let mut moved = *block;
+        for (row, mus) in self.0.as_chunks::<N>().0.iter().enumerate() {
+            let (x, y) = (&bx[row / N], &by[row % N]);
+            let xy: Lane = std::array::from_fn(|l| BOX_SIDE * x[l] * y[l]);
+            for (z, mu) in bz.iter().zip(mus) {
+                let weight: Lane = std::array::from_fn(|l| xy[l] * z[l]);
+                for (coordinate, mu) in moved.iter_mut().zip(mu) {
+                    (0..LANES).for_each(|l| coordinate[l] += weight[l] * mu);
                 }
             }
         }
+        let inside = |l: usize| (0..3).all(|axis| (0.0..=1.0).contains(&u[axis][l]));
+        let outside: [bool; LANES] = std::array::from_fn(|l| !inside(l));
+        for (coordinate, before) in moved.iter_mut().zip(block) {
+            (0..LANES).filter(|&l| outside[l]).for_each(|l| coordinate[l] = before[l]);
+        }
+        moved
     }
-    moved
 }
 
 /// The five Bernstein polynomials of degree 4 at `u`.
+#[inline(always)]
 fn bernstein(u: f64) -> [f64; CONTROL_POINTS_PER_AXIS] {
     let v = 1.0 - u;
     [v * v * v * v, 4.0 * u * v * v * v, 6.0 * u * u * v * v, 4.0 * u * u * u * v, u * u * u * u]
@@ -91,7 +108,7 @@ mod tests {
 
     #[test]
     fn a_lattice_moved_as_a_whole_moves_the_points_twice_as_far() {
-        let out = deform(&[0.3, -0.2, 0.9], &[[0.1, 0.0, -0.05]; CONTROL_POINTS]);
+        let out = deform(&[[0.3, -0.2, 0.9]], &[[0.1, 0.0, -0.05]; CONTROL_POINTS])[0];
         assert!((out[0] - 0.5).abs() < 1e-12 && out[1] == -0.2 && (out[2] - 0.8).abs() < 1e-12);
     }
 
@@ -99,9 +116,34 @@ mod tests {
     fn a_corner_follows_its_control_point_and_outside_nothing_moves() {
         let mut displacements = [[0.0; 3]; CONTROL_POINTS];
         displacements[4] = [0.1, 0.2, 0.3]; // i = 0, j = 0, k = 4: the corner (-1, -1, 1)
-        let out = deform(&[-1.0, -1.0, 1.0], &displacements);
+        let out = deform(&[[-1.0, -1.0, 1.0]], &displacements)[0];
         assert!((0..3).all(|c| (out[c] - [-0.8, -0.6, 1.6][c]).abs() < 1e-12), "{out:?}");
-        assert_eq!(deform(&[-1.0, -1.0, 1.1], &displacements), [-1.0, -1.0, 1.1]);
+        assert_eq!(deform(&[[-1.0, -1.0, 1.1]], &displacements), [[-1.0, -1.0, 1.1]]);
+    }
+
+    /// The definition, point by point.
+    fn one_by_one(point: &[f64; 3], displacements: &Displacements) -> [f64; 3] {
+        const N: usize = CONTROL_POINTS_PER_AXIS;
+        let u = point.map(|c| (c + 1.0) / BOX_SIDE);
+        if u.iter().any(|c| !(0.0..=1.0).contains(c)) {
+            return *point;
+        }
+        let [bx, by, bz] = u.map(bernstein);
+        std::array::from_fn(|c| {
+            displacements.iter().enumerate().fold(point[c], |sum, (index, mu)| {
+                sum + BOX_SIDE * bx[index / (N * N)] * by[index / N % N] * bz[index % N] * mu[c]
+            })
+        })
+    }
+
+    #[test]
+    fn blocks_have_the_bits_of_the_definition() {
+        let displacements = draw_displacements(Severity::ALL[2], &mut rng(3));
+        // 77 leave a part of a block.
+        let points = [cloud(77), vec![[1.0; 3], [-1.0; 3], [0.0, -0.0, 2.0], [1e3, 0.0, 0.0]]].concat();
+        let bits = |points: Vec<[f64; 3]>| points.iter().flatten().map(|c| c.to_bits()).collect::<Vec<_>>();
+        let expected = bits(points.iter().map(|p| one_by_one(p, &displacements)).collect());
+        assert_eq!(bits(deform(&points, &displacements)), expected);
     }
 
     #[test]

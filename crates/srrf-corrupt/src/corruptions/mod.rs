@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::card::Card;
 
+mod blocks;
 pub mod clusters;
 mod draws;
 pub mod lattice;

@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use nalgebra::{DMatrix, Dyn, LU, Vector3};
 use rand::{Rng, RngExt};
 
+use super::blocks::{BlockMotion, LANES, Lane, move_all};
 use super::lattice::{CONTROL_POINTS, CONTROL_POINTS_PER_AXIS, Displacements};
 use crate::corruption::CorruptError;
 use crate::severity::Severity;
@@ -43,8 +44,13 @@ pub fn draw_displacements<R: Rng>(severity: Severity, rng: &mut R) -> Displaceme
 /// The control points; the one at step `(i, j, k)` along x, y, z has index `(5 i + j) 5 + k`.
 pub fn control_points() -> [[f64; 3]; CONTROL_POINTS] {
     const N: usize = CONTROL_POINTS_PER_AXIS;
-    let at = |step: usize| 2.0 * step as f64 / (N - 1) as f64 - 1.0;
-    std::array::from_fn(|index| [at(index / (N * N)), at(index / N % N), at(index % N)])
+    std::array::from_fn(|index| [index / (N * N), index / N % N, index % N].map(at_step))
+}
+
+/// Coordinate of the control points at a step along an axis.
+#[inline(always)]
+fn at_step(step: usize) -> f64 {
+    2.0 * step as f64 / (CONTROL_POINTS_PER_AXIS - 1) as f64 - 1.0
 }
 
 impl Kernel {
@@ -77,30 +83,16 @@ impl Kernel {
             );
         let solution = self.factored().solve(&rhs).ok_or(CorruptError::Singular(self.name()))?;
         let row = |i: usize| [solution[(i, 0)], solution[(i, 1)], solution[(i, 2)]];
-        let weights: Vec<[f64; 3]> = (0..CONTROL_POINTS).map(row).collect();
-        let affine: [[f64; 3]; 4] = std::array::from_fn(|i| row(CONTROL_POINTS + i));
-        let controls = control_points();
-        let mut phi = [0.0; CONTROL_POINTS];
-        Ok(points
-            .iter()
-            .map(|p| {
-                for (value, control) in phi.iter_mut().zip(&controls) {
-                    *value = self.phi((0..3).map(|c| (p[c] - control[c]).powi(2)).sum());
-                }
-                let mut moved: [f64; 3] = std::array::from_fn(|c| {
-                    p[c] + affine[0][c] + p[0] * affine[1][c] + p[1] * affine[2][c] + p[2] * affine[3][c]
-                });
-                for (value, weight) in phi.iter().zip(&weights) {
-                    for c in 0..3 {
-                        moved[c] += value * weight[c];
-                    }
-                }
-                moved
-            })
-            .collect())
+        let warp = Warp {
+            kernel: *self,
+            weights: std::array::from_fn(row),
+            affine: std::array::from_fn(|i| row(CONTROL_POINTS + i)),
+        };
+        Ok(move_all(points, &warp))
     }
 
     /// The basis function at a squared distance.
+    #[inline(always)]
     fn phi(self, squared: f64) -> f64 {
         let root = (squared + RADIUS * RADIUS).sqrt();
         match self {
@@ -131,6 +123,52 @@ impl Kernel {
     }
 }
 
+/// The interpolant of one set of displacements.
+struct Warp {
+    kernel: Kernel,
+    weights: [[f64; 3]; CONTROL_POINTS],
+    affine: [[f64; 3]; 4],
+}
+
+impl BlockMotion for Warp {
+    #[inline(always)]
+    fn apply(&self, block: &[Lane; 3]) -> [Lane; 3] {
+        match self.kernel {
+            Kernel::Multiquadric => self.moved(block, |squared| Kernel::Multiquadric.phi(squared)),
+            Kernel::InverseMultiquadric => {
+                self.moved(block, |squared| Kernel::InverseMultiquadric.phi(squared))
+            }
+        }
+    }
+}
+
+impl Warp {
+    #[inline(always)]
+    fn moved(&self, block: &[Lane; 3], phi: impl Fn(f64) -> f64) -> [Lane; 3] {
+        const N: usize = CONTROL_POINTS_PER_AXIS;
+        let [x, y, z] = block;
+        // The control points lie on a grid: of each axis there are five distances.
+        let squares: [[Lane; N]; 3] = std::array::from_fn(|c| {
+            std::array::from_fn(|step| block[c].map(|p| (p - at_step(step)) * (p - at_step(step))))
+        });
+        let q = &self.affine;
+        let mut moved: [Lane; 3] = std::array::from_fn(|c| {
+            std::array::from_fn(|l| block[c][l] + q[0][c] + x[l] * q[1][c] + y[l] * q[2][c] + z[l] * q[3][c])
+        });
+        for (row, weights) in self.weights.as_chunks::<N>().0.iter().enumerate() {
+            let (x, y) = (&squares[0][row / N], &squares[1][row % N]);
+            let xy: Lane = std::array::from_fn(|l| x[l] + y[l]);
+            for (z, weight) in squares[2].iter().zip(weights) {
+                let value: Lane = std::array::from_fn(|l| phi(xy[l] + z[l]));
+                for (coordinate, weight) in moved.iter_mut().zip(weight) {
+                    (0..LANES).for_each(|l| coordinate[l] += value[l] * weight);
+                }
+            }
+        }
+        moved
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -148,6 +186,37 @@ mod tests {
                 assert!((0..3).all(|c| (p[c] - control[c] - d[c]).abs() < 1e-10));
                 assert!((d.iter().map(|c| c * c).sum::<f64>().sqrt() - 0.125).abs() < 1e-12);
             }
+        }
+    }
+
+    /// The definition, point by point.
+    fn one_by_one(kernel: Kernel, points: &[[f64; 3]], displacements: &Displacements) -> Vec<[f64; 3]> {
+        let rhs = DMatrix::from_fn(UNKNOWNS, 3, |r, c| displacements.get(r).map_or(0.0, |d| d[c]));
+        let w = kernel.factored().solve(&rhs).unwrap();
+        let q = |i: usize, c: usize| w[(CONTROL_POINTS + i, c)];
+        let moved = |p: &[f64; 3]| -> [f64; 3] {
+            std::array::from_fn(|c| {
+                let affine = p[c] + q(0, c) + p[0] * q(1, c) + p[1] * q(2, c) + p[2] * q(3, c);
+                control_points().iter().enumerate().fold(affine, |sum, (i, control)| {
+                    let squared: f64 = (0..3).map(|c| (p[c] - control[c]).powi(2)).sum();
+                    let root = (squared + RADIUS * RADIUS).sqrt();
+                    sum + w[(i, c)] * if kernel == Kernel::Multiquadric { root } else { 1.0 / root }
+                })
+            })
+        };
+        points.iter().map(moved).collect()
+    }
+
+    #[test]
+    fn blocks_have_the_bits_of_the_definition() {
+        let displacements = draw_displacements(Severity::ALL[2], &mut rng(3));
+        for kernel in BOTH {
+            // 77 leave a part of a block.
+            let points = [cloud(77), control_points().to_vec(), vec![[0.0; 3], [-0.0, 9.0, -1e3]]].concat();
+            let bits =
+                |points: Vec<[f64; 3]>| points.iter().flatten().map(|c| c.to_bits()).collect::<Vec<_>>();
+            let expected = bits(one_by_one(kernel, &points, &displacements));
+            assert_eq!(bits(kernel.deform(&points, &displacements).unwrap()), expected);
         }
     }
 
