@@ -5,7 +5,7 @@ from typing import Any
 
 import daft
 
-from srrf._rows import SCHEMA, PairRegistrar
+from srrf.rows import SCHEMA, PairRegistrar
 
 ANSWER = daft.DataType.struct({field.name: daft.DataType.from_arrow_type(field.type) for field in SCHEMA})
 

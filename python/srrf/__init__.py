@@ -8,6 +8,7 @@ The network is in the package: nothing is downloaded, and no PyTorch is needed.
 """
 
 from . import _srrf
+from ._align import Map, PlacedScan, align
 from ._errors import (
     FileError,
     InputError,
@@ -16,9 +17,10 @@ from ._errors import (
     MissingFileError,
     NoPoseError,
     OptionError,
+    ReadingWarning,
     SrrfError,
 )
-from ._files import read, write
+from ._files import Scan, read, scans, unit_factor, write
 from ._register import Registrar, Target, register
 from ._result import Pose, Result
 from ._score import Scores, score
@@ -39,23 +41,30 @@ __all__ = [
     "InputError",
     "InputTypeError",
     "InternalError",
+    "Map",
     "MissingFileError",
     "NoPoseError",
     "OptionError",
     "Pair",
     "PairArrays",
     "Pairs",
+    "PlacedScan",
     "Pose",
+    "ReadingWarning",
     "Registrar",
     "Result",
+    "Scan",
     "Scores",
     "SrrfError",
     "Target",
     "__version__",
+    "align",
     "corrupt",
     "pairs",
     "read",
     "register",
+    "scans",
     "score",
+    "unit_factor",
     "write",
 ]

@@ -50,15 +50,34 @@ def points_of(cloud: Cloud, name: str) -> NDArray[Any]:
 
 
 def cloud_of(cloud: Cloud, name: str | None, default: str) -> _srrf.Cloud:
-    """The points of a cloud or a file, copied, without those that are NaN or infinite.
+    """The points of a cloud or a file, copied, without those that are NaN or infinite; with the faces of a mesh.
 
     A file has its path as its name unless it is given another.
     """
     if isinstance(cloud, (str, os.PathLike)):
-        path = os.fspath(cloud)
-        return _srrf.Cloud(_srrf.read(path), name or path)
+        return _srrf.open(cloud, name)
     name = name or default
-    return _srrf.Cloud(points_of(cloud, name), name)
+    points = points_of(cloud, name)
+    return _srrf.Cloud(points, name, _faces_of(cloud, len(points), name))
+
+
+def _faces_of(cloud: Any, points: int, name: str) -> NDArray[np.uint32] | None:
+    """The triangles of a mesh, shape (M, 3), as indices of its points; None of a cloud."""
+    for attribute in ("triangles", "faces"):  # Open3D; trimesh, PyVista
+        held = getattr(cloud, attribute, None)
+        if held is None or callable(held):
+            continue
+        faces = np.asarray(held)
+        if faces.size == 0 or faces.dtype.kind not in "iu":
+            continue
+        if faces.ndim == 1 and faces.size % 4 == 0 and bool((faces[::4] == 3).all()):  # PyVista: 3 a b c
+            faces = faces.reshape(-1, 4)[:, 1:]
+        if faces.ndim != 2 or faces.shape[1] != 3:
+            raise InputError(f"{name}: faces of shape {faces.shape}, where triangles (M, 3) are expected; triangulate the mesh")
+        if faces.min() < 0 or faces.max() >= points:
+            raise InputError(f"{name}: a face names point {faces.max()} of {points} (from 0); mend the mesh")
+        return np.ascontiguousarray(faces, dtype=np.uint32)
+    return None
 
 
 def _array_of(cloud: Any, name: str) -> NDArray[Any]:

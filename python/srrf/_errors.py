@@ -29,5 +29,9 @@ class NoPoseError(SrrfError, RuntimeError):
     """Two good clouds for which no method found a pose. An answer that is doubtful is no error: see ``Result.abstain``."""
 
 
+class ReadingWarning(UserWarning):
+    """What should be known of how a file was read or written."""
+
+
 class InternalError(SrrfError, RuntimeError):
     """A fault of the package itself. Please report it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, TypedDict, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from ._result import Result
 
 Method = Literal["auto", "srrf", "fpfh-ransac", "icp", "given"]
 Rotation = Literal["so3", "180", "45", 180, 45]
+Scale = Union[float, Literal["auto"], None]
 
 
 class Options(TypedDict):
@@ -27,6 +28,8 @@ class Options(TypedDict):
     device: str
     seed: int
     abstain_below: float
+    vertices: bool
+    scale: float | str | None
     num_threads: int | None
 
 
@@ -45,6 +48,10 @@ class Registrar:
         device: where the network runs: ``"flex"`` (CPU).
         seed: seed of the random samples. The same seed gives the same answer, on any number of threads.
         abstain_below: the verdict is to abstain where the probability is below this.
+        vertices: whether the vertices of a mesh are its cloud. Without it points are drawn from its surface, as dense as the other
+            cloud, as the program does.
+        scale: what the source is multiplied by before it is moved, such as ``srrf.unit_factor("mm", "m")``; ``"auto"`` estimates
+            it; None refuses clouds that seem to be in different units.
         num_threads: worker threads; None for all cores.
 
     Raises:
@@ -63,6 +70,8 @@ class Registrar:
         device: str = "flex",
         seed: int = 0,
         abstain_below: float = 0.5,
+        vertices: bool = False,
+        scale: Scale = None,
         num_threads: int | None = None,
     ) -> None:
         self._options = _options(
@@ -73,6 +82,8 @@ class Registrar:
             device=device,
             seed=seed,
             abstain_below=abstain_below,
+            vertices=vertices,
+            scale=scale,
             num_threads=num_threads,
         )
         self._inner = _srrf.Registrar(**self._options)
@@ -90,7 +101,8 @@ class Registrar:
             name: what messages call it; its path, or ``"target"``.
 
         Raises:
-            InputError: for a cloud that determines no rotation.
+            InputError: for a cloud that determines no rotation, and for a mesh without ``vertices=True``: how densely its surface is
+                drawn depends on the source.
         """
         return Target(self, self._inner.prepare(cloud_of(target, name, "target")))
 
@@ -119,10 +131,10 @@ class Registrar:
         laid = cloud_of(source, names[0], "source")
         guess = None if initial is None else pose_of(initial, "initial")
         if isinstance(target, Target):
-            text = self._inner.register(laid, target._inner, guess)
-            return Result(text, (laid, target._inner.cloud))
-        onto = cloud_of(target, names[1], "target")
-        return Result(self._inner.register(laid, onto, guess), (laid, onto))
+            text, *clouds = self._inner.register(laid, target._inner, guess)
+        else:
+            text, *clouds = self._inner.register(laid, cloud_of(target, names[1], "target"), guess)
+        return Result(text, (clouds[0], clouds[1]))
 
     def __repr__(self) -> str:
         return f"srrf.Registrar({', '.join(f'{k}={v!r}' for k, v in self._options.items())})"
@@ -167,6 +179,8 @@ def register(
     device: str = "flex",
     seed: int = 0,
     abstain_below: float = 0.5,
+    vertices: bool = False,
+    scale: Scale = None,
     num_threads: int | None = None,
 ) -> Result:
     """Finds the pose that lays ``source`` on ``target``, and says whether to rely on it.
@@ -195,6 +209,8 @@ def register(
         device=device,
         seed=seed,
         abstain_below=abstain_below,
+        vertices=vertices,
+        scale=scale,
         num_threads=num_threads,
     )
     return _registrar(options).register(source, target, initial=initial)
@@ -209,8 +225,14 @@ def _options(
     device: str,
     seed: int,
     abstain_below: float,
+    vertices: bool,
+    scale: float | str | None,
     num_threads: int | None,
 ) -> Options:
+    if scale is not None and not isinstance(scale, str):
+        if isinstance(scale, bool) or not isinstance(scale, (int, float, np.integer, np.floating)):
+            raise OptionError(f'scale is {scale!r}: expected a number above 0, "auto", or None')
+        scale = float(scale)
     if not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**64:
         raise OptionError(f"seed is {seed!r}: expected a whole number from 0 to 2**64 - 1")
     if num_threads is not None and not isinstance(num_threads, (int, np.integer)):
@@ -226,6 +248,8 @@ def _options(
         device=device,
         seed=int(seed),
         abstain_below=float(abstain_below),
+        vertices=bool(vertices),
+        scale=scale,
         num_threads=None if num_threads is None else int(num_threads),
     )
 

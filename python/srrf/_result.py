@@ -78,6 +78,12 @@ class Result:
         return bool(self._figures["abstain"])
 
     @property
+    def scale(self) -> float:
+        """What the source was multiplied by before it was moved: 1 where no scale was asked for."""
+        applied = self._figures.get("scale")
+        return 1.0 if applied is None else float(applied["factor"])
+
+    @property
     def poses(self) -> list[Pose]:
         """All poses that fit, the answer first. More than one where the clouds do not tell them apart."""
         others = self._figures.get("poses") or [
@@ -115,10 +121,11 @@ class Result:
         return self._text
 
     def transform(self, points: Cloud) -> NDArray[np.float64]:
-        """Points of the source, moved onto the target: shape (N, 3), float64."""
+        """Points of the source, scaled where a scale was asked for and moved onto the target: shape (N, 3), float64."""
         from ._arrays import points_of
 
-        moved: NDArray[np.float64] = points_of(points, "points").astype(np.float64) @ self.rotation.T + self.translation
+        scaled = points_of(points, "points").astype(np.float64) * self.scale
+        moved: NDArray[np.float64] = scaled @ self.rotation.T + self.translation
         return moved
 
     def to_html(

@@ -136,6 +136,10 @@ class PairArrays:
         return len(self.corruption)
 
 
+#: Pairs that are made at once where one after the other is asked for.
+_TOGETHER = 64
+
+
 class Pairs(Sequence[Pair]):
     """Pairs of the corruption benchmark, made when they are asked for: see :func:`pairs`."""
 
@@ -159,17 +163,22 @@ class Pairs(Sequence[Pair]):
 
     def __getitem__(self, index: int | slice) -> Pair | list[Pair]:
         if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        return Pair(**self._inner.pair(self._place(index)))
+            return self.take(range(*index.indices(len(self))))
+        return self.take([index])[0]
 
     def __iter__(self) -> Iterator[Pair]:
-        return (self[index] for index in range(len(self)))
+        for begin in range(0, len(self), _TOGETHER):
+            yield from self[begin : begin + _TOGETHER]
+
+    def take(self, indices: Sequence[int]) -> list[Pair]:
+        """The pairs of these indices, made in parallel."""
+        return [Pair(**made) for made in self._inner.pairs([self._place(int(index)) for index in indices])]
 
     def arrays(self, indices: Sequence[int] | slice | None = None) -> PairArrays:
         """Stacks the pairs of these indices (all of them without), made in parallel.
 
         Raises:
-            InputError: where clouds differ in size, as crops do.
+            InputError: where clouds differ in size, as crops do; :meth:`take` them then.
         """
         if indices is None:
             chosen: Sequence[int] = range(len(self))

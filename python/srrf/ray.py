@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from ._rows import SCHEMA, PairRegistrar, check_names
+from .rows import SCHEMA, PairRegistrar, check_names
 
 __all__ = ["SCHEMA", "RegisterPairs", "main"]
 

@@ -7,18 +7,29 @@ from typing import Any
 
 import numpy as np
 from torch import Tensor, from_numpy
-from torch.utils.data import IterableDataset, get_worker_info
+from torch.utils.data import IterableDataset, default_collate, get_worker_info
 
 from ._synthesis import Pairs, pairs
 
 _TOGETHER = 64
 
 
+def collate(items: list[dict[str, Any]]) -> dict[str, Any]:
+    """A batch, for ``collate_fn`` of a ``DataLoader``: clouds of one size are stacked, and those that differ in size, as after a
+    ``cutout``, stay a list of tensors."""
+    batch = {}
+    for name in items[0]:
+        values = [item[name] for item in items]
+        ragged = isinstance(values[0], Tensor) and any(value.shape != values[0].shape for value in values)
+        batch[name] = values if ragged else default_collate(values)
+    return batch
+
+
 class PairDataset(IterableDataset[dict[str, Any]]):
     """Pairs as dictionaries of tensors: ``source`` and ``target`` (N, 3), ``target_from_source`` (4, 4).
 
     The pairs are those of ``srrf.pairs`` with the same options; by default the shapes are those to learn from. Workers of a
-    ``DataLoader`` share them without overlap. Epoch 0 has the seed itself, and epoch ``e`` the seed plus ``e``: call
+    ``DataLoader`` share them without overlap; some corruptions change the number of points, and :func:`collate` takes all. Epoch 0 has the seed itself, and epoch ``e`` the seed plus ``e``: call
     :meth:`set_epoch` before each.
 
     Args:
@@ -53,15 +64,14 @@ class PairDataset(IterableDataset[dict[str, Any]]):
         order = np.random.default_rng([self._options["seed"], self._epoch]).permutation(len(made))
         for begin in range(0, len(places), together):
             chosen = [int(order[place]) for place in places[begin : begin + together]]
-            batch = made.arrays(chosen)
-            for i in range(len(chosen)):
+            for index, pair in zip(chosen, made.take(chosen)):
                 yield {
-                    "source": self._tensor(batch.source[i]),
-                    "target": self._tensor(batch.target[i]),
-                    "target_from_source": self._tensor(batch.target_from_source[i]),
-                    "corruption": batch.corruption[i],
-                    "severity": int(batch.severity[i]),
-                    "index": chosen[i],
+                    "source": self._tensor(pair.source),
+                    "target": self._tensor(pair.target),
+                    "target_from_source": self._tensor(pair.target_from_source),
+                    "corruption": pair.corruption,
+                    "severity": pair.severity,
+                    "index": index,
                 }
 
     def _of_epoch(self) -> Pairs:

@@ -207,7 +207,7 @@ def test_rows_are_those_of_the_programs_batch(cloud, target, tmp_path):
     pa = pytest.importorskip("pyarrow")
     import pyarrow.parquet as parquet
 
-    from srrf._rows import SCHEMA, PairRegistrar
+    from srrf.rows import SCHEMA, PairRegistrar
 
     srrf.write(tmp_path / "a.npy", cloud)
     srrf.write(tmp_path / "b.npy", target)

@@ -41,13 +41,20 @@ macro_rules! model {
 }
 
 /// The networks in the program, the default first. `weights/LINEAGE.toml` names these and what they were trained from.
+/// Those that are there to compare need the feature `every-network`.
 pub const MODELS: &[EmbeddedModel] = &[
     model!("srrf", card "srrf", registers true),
+    #[cfg(feature = "every-network")]
     model!("srrf-small", card "srrf-small", registers true),
     model!("srrf-shapes", card "srrf-shapes", registers true),
+    #[cfg(feature = "every-network")]
     model!("srrf-ddl", card "srrf-ddl", registers false),
+    #[cfg(feature = "every-network")]
     model!("srrf-no-ddl", card "srrf-ddl", registers false),
 ];
+
+/// The networks of the feature `every-network`.
+const TO_COMPARE: [&str; 3] = ["srrf-small", "srrf-ddl", "srrf-no-ddl"];
 
 /// Names of the models to register with, the default first.
 pub fn names() -> impl Iterator<Item = &'static str> {
@@ -80,10 +87,18 @@ pub fn open(name: &str, device: &Device) -> Result<LoadedModel, WeightsError> {
         return loaded;
     }
     if !Path::new(name).exists() {
-        let known = names().collect::<Vec<_>>().join(", ");
-        return Err(WeightsError::Unknown { name: name.to_owned(), known });
+        return Err(unknown(name));
     }
     weights::load(Path::new(name), device)
+}
+
+/// What is said of a name that is no file, and no model in the program.
+pub fn unknown(name: &str) -> WeightsError {
+    let (name, known) = (name.to_owned(), names().collect::<Vec<_>>().join(", "));
+    match TO_COMPARE.contains(&&*name) {
+        true => WeightsError::NotInThisBuild { name, known },
+        false => WeightsError::Unknown { name, known },
+    }
 }
 
 /// The default model, `srrf`.
@@ -106,8 +121,12 @@ mod tests {
         for name in names() {
             assert_eq!(load(name, &device).unwrap().unwrap().name, name);
         }
-        assert_eq!(names().count(), 3);
-        assert!(contains("srrf-ddl") && contains("srrf") && !contains("srrf-large"));
+        let every = cfg!(feature = "every-network");
+        assert_eq!(names().count(), if every { 3 } else { 2 });
+        assert!(contains("srrf") && !contains("srrf-large"));
+        for name in TO_COMPARE {
+            assert_eq!(contains(name), every, "{name}");
+        }
         for model in MODELS {
             assert!(load(model.name, &device).unwrap().is_ok(), "{}", model.name);
             assert!(model.weights.card.starts_with("# srrf"), "{}", model.name);
@@ -116,6 +135,8 @@ mod tests {
         assert_eq!(open("srrf-shapes", &device).unwrap().name, "srrf-shapes");
         let unknown = open("srrf-large", &device).unwrap_err().to_string();
         assert!(unknown.contains("srrf-large: no such file") && unknown.contains("srrf-shapes"), "{unknown}");
+        let left_out = unknown("srrf-small").to_string();
+        assert!(left_out.contains("crates/srrf-model/weights/srrf-small.safetensors"), "{left_out}");
         assert_eq!(load_default(&device).unwrap().name, "srrf");
     }
 }

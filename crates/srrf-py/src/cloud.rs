@@ -5,11 +5,14 @@ use std::sync::Arc;
 use numpy::ndarray::ArrayView2;
 use numpy::{Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
+use srrf::Warning;
+use srrf_args::files::Input;
+use srrf_cloud::io::{Contents, Note};
 use srrf_cloud::{CloudError, PointCloud};
 
 use crate::refusal::{Fault, Refusal};
 
-/// The finite points of an array of shape `(n, >= 3)`. Copies share them.
+/// The finite points of an array of shape `(n, >= 3)` or of a file. Copies share them.
 #[pyclass(frozen, module = "srrf._srrf")]
 #[derive(Debug, Clone)]
 pub struct Cloud {
@@ -20,17 +23,33 @@ pub struct Cloud {
     /// Points left out because a coordinate is NaN or infinite.
     #[pyo3(get)]
     pub dropped: usize,
+    /// Triangles of a mesh, as indices of `points`.
+    pub faces: Arc<Vec<[u32; 3]>>,
+    /// Faces that were left out, because a corner is NaN or infinite.
+    pub lost_faces: usize,
+    /// Where the scanner stood, where a file says it.
+    pub viewpoint: Option<[f64; 3]>,
+    /// What is to be known of how its file was read.
+    pub notes: Vec<Note>,
 }
 
 #[pymethods]
 impl Cloud {
     #[new]
-    fn new(array: &Bound<'_, PyAny>, name: String) -> Result<Self, Refusal> {
-        let all = rows(array, &name)?;
-        let before = all.len();
-        let finite: Vec<[f64; 3]> = all.into_iter().filter(|p| p.iter().all(|c| c.is_finite())).collect();
-        let dropped = before - finite.len();
-        if finite.is_empty() && dropped > 0 {
+    #[pyo3(signature = (array, name, faces = None))]
+    fn new(
+        array: &Bound<'_, PyAny>,
+        name: String,
+        faces: Option<PyReadonlyArray2<'_, u32>>,
+    ) -> Result<Self, Refusal> {
+        let points = rows(array, &name)?;
+        let corners = faces.map_or_else(Vec::new, |faces| {
+            faces.as_array().rows().into_iter().map(|f| [f[0], f[1], f[2]]).collect()
+        });
+        let (before, all_faces) = (points.len(), corners.len());
+        let mut contents = Contents { faces: corners, ..Contents::of_points(points) };
+        let dropped = contents.drop_not_finite();
+        if dropped == before && dropped > 0 {
             return Err(Refusal::new(
                 Fault::Input,
                 format!(
@@ -38,8 +57,16 @@ impl Cloud {
                 ),
             ));
         }
-        let points = PointCloud::new(finite).map_err(|e| Refusal::cloud(&name, &e))?;
-        Ok(Self { points: Arc::new(points), name, dropped })
+        let lost_faces = all_faces - contents.faces.len();
+        let points = PointCloud::new(contents.points).map_err(|e| Refusal::cloud(&name, &e))?;
+        let (points, faces) = (Arc::new(points), Arc::new(contents.faces));
+        Ok(Self { points, name, dropped, faces, lost_faces, viewpoint: None, notes: Vec::new() })
+    }
+
+    /// Whether it has faces.
+    #[getter]
+    pub fn is_mesh(&self) -> bool {
+        self.faces.len() + self.lost_faces > 0
     }
 
     fn __len__(&self) -> usize {
@@ -49,6 +76,28 @@ impl Cloud {
     /// The points, shape `(n, 3)`.
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         to_array(py, self.points.points().to_vec())
+    }
+}
+
+impl Cloud {
+    /// As the program reads a file.
+    pub fn of_input(input: Input, name: String) -> Self {
+        let Input { cloud, dropped, faces, lost_faces, viewpoint, notes, .. } = input;
+        let (points, faces) = (Arc::new(cloud), Arc::new(faces));
+        Self { points, name, dropped, faces, lost_faces, viewpoint, notes }
+    }
+
+    /// With other points, and no faces.
+    pub fn with_points(&self, points: PointCloud) -> Self {
+        Self { points: Arc::new(points), faces: Arc::default(), lost_faces: 0, ..self.clone() }
+    }
+
+    /// What is to be known of how it came about.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let cloud = || self.name.clone();
+        let left_out = (self.dropped > 0).then(|| Warning::LeftOut { cloud: cloud(), points: self.dropped });
+        let notes = self.notes.iter().map(|note| Warning::Reading { cloud: cloud(), note: note.clone() });
+        left_out.into_iter().chain(notes).collect()
     }
 }
 

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 
 use refusal::{Fault, Refusal};
 
+mod align;
 mod cloud;
 mod corruption;
 mod files;
@@ -19,6 +20,7 @@ mod program;
 mod refusal;
 mod registrar;
 mod score;
+mod surface;
 mod work;
 
 /// JSON as the program writes it: keys in order, numbers in the fewest digits that give the same bits.
@@ -42,9 +44,13 @@ fn _srrf(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<registrar::PyRegistrar>()?;
     module.add_class::<registrar::PyTarget>()?;
     module.add_class::<pairs::Pairs>()?;
+    module.add_function(wrap_pyfunction!(align::align, module)?)?;
     module.add_function(wrap_pyfunction!(canonical_json, module)?)?;
     module.add_function(wrap_pyfunction!(corruption::corrupt, module)?)?;
+    module.add_function(wrap_pyfunction!(files::open, module)?)?;
     module.add_function(wrap_pyfunction!(files::read, module)?)?;
+    module.add_function(wrap_pyfunction!(files::scans, module)?)?;
+    module.add_function(wrap_pyfunction!(files::unit_factor, module)?)?;
     module.add_function(wrap_pyfunction!(files::write, module)?)?;
     module.add_function(wrap_pyfunction!(picture::page, module)?)?;
     module.add_function(wrap_pyfunction!(pose::rigid_motion, module)?)?;

@@ -1,5 +1,6 @@
 //! The options of a registration, by their names in Python.
 
+use pyo3::prelude::*;
 use srrf::{Method, Options, Probability, RotationRange};
 
 use crate::refusal::{Fault, Refusal};
@@ -14,14 +15,55 @@ pub struct Asked {
     pub device: String,
     pub seed: u64,
     pub abstain_below: f64,
+    pub scale: Option<AskedScale>,
+}
+
+/// What the source is multiplied by.
+#[derive(Debug, Clone, FromPyObject)]
+pub enum AskedScale {
+    Factor(f64),
+    Word(String),
+}
+
+/// As [`AskedScale`], understood.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scale {
+    /// Nothing was said: an error where the clouds seem to be in different units.
+    Ask,
+    /// By this.
+    Factor(f64),
+    /// By what fits.
+    Auto,
 }
 
 impl Asked {
+    /// What is said of the scale.
+    ///
+    /// # Errors
+    /// [`Fault::Option`].
+    pub fn scale(&self) -> Result<Scale, Refusal> {
+        match &self.scale {
+            None => Ok(Scale::Ask),
+            Some(AskedScale::Factor(factor)) if factor.is_finite() && *factor > 0.0 => {
+                Ok(Scale::Factor(*factor))
+            }
+            Some(AskedScale::Word(word)) if word == "auto" => Ok(Scale::Auto),
+            Some(other) => {
+                let said = match other {
+                    AskedScale::Factor(factor) => factor.to_string(),
+                    AskedScale::Word(word) => format!("`{word}`"),
+                };
+                let message =
+                    format!("scale is {said}: expected a finite number above 0, such as 0.001, or \"auto\"");
+                Err(Refusal::new(Fault::Option, message))
+            }
+        }
+    }
+
     /// The library's options.
     ///
     /// # Errors
     /// [`Fault::Option`] names the one that makes no sense.
-    #[allow(clippy::needless_update, reason = "options to come keep their defaults")]
     pub fn options(self) -> Result<Options, Refusal> {
         let refuse = |message: String| Refusal::new(Fault::Option, message);
         let method: Method = self.method.parse().map_err(|e: srrf::OptionsError| refuse(e.to_string()))?;
@@ -41,7 +83,7 @@ impl Asked {
             device: self.device,
             seed: self.seed,
             abstain_below,
-            ..defaults
+            check_scale: self.scale.is_none(),
         })
     }
 }

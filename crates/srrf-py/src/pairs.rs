@@ -24,7 +24,7 @@ use crate::work;
 pub struct Pairs {
     inner: Arc<SynthesizedPairs>,
     /// Group and item of each pair.
-    places: Arc<Vec<(usize, usize)>>,
+    places: Vec<(usize, usize)>,
     threads: usize,
 }
 
@@ -93,7 +93,7 @@ impl Pairs {
         })?;
         let items = |(group, of): (usize, &srrf_eval::Group)| (0..of.pairs).map(move |item| (group, item));
         let places = inner.groups().iter().enumerate().flat_map(items).collect();
-        Ok(Self { inner: Arc::new(inner), places: Arc::new(places), threads })
+        Ok(Self { inner: Arc::new(inner), places, threads })
     }
 
     fn __len__(&self) -> usize {
@@ -105,37 +105,29 @@ impl Pairs {
         self.inner.description()
     }
 
-    /// Pair `index` as a dictionary of arrays.
-    fn pair<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyDict>> {
-        let (inner, places) = (Arc::clone(&self.inner), Arc::clone(&self.places));
-        let (group, item) = places[index];
-        let made = work::run(py, 1, move |_| Ok(inner.bare_pair(group, item)?))?;
-        let dict = self.described(py, &made, group)?;
-        dict.set_item("target_from_source", pose::matrix(py, &made.target_from_source)?)?;
-        for (name, origin) in [("source_origin", &made.source_origin), ("target_origin", &made.target_origin)]
-        {
-            dict.set_item(name, origin.as_ref().map(|origin| origins(py, origin)))?;
-        }
-        dict.set_item("source", to_array(py, made.source.into_points())?)?;
-        dict.set_item("target", to_array(py, made.target.into_points())?)?;
-        Ok(dict)
+    /// The pairs of these indices as dictionaries of arrays: made in parallel.
+    fn pairs<'py>(&self, py: Python<'py>, indices: Vec<usize>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let threads = if indices.len() == 1 { 1 } else { self.threads };
+        let made = self.make(py, threads, &indices, |pairs| Ok(pairs))?;
+        let dict = |(made, index): (Pair, usize)| {
+            let dict = self.described(py, &made, self.places[index].0)?;
+            dict.set_item("target_from_source", pose::matrix(py, &made.target_from_source)?)?;
+            for (name, origin) in
+                [("source_origin", &made.source_origin), ("target_origin", &made.target_origin)]
+            {
+                dict.set_item(name, origin.as_ref().map(|origin| origins(py, origin)))?;
+            }
+            dict.set_item("source", to_array(py, made.source.into_points())?)?;
+            dict.set_item("target", to_array(py, made.target.into_points())?)?;
+            Ok(dict)
+        };
+        made.into_iter().zip(indices).map(dict).collect()
     }
 
     /// The pairs of these indices, stacked: made in parallel.
     fn arrays<'py>(&self, py: Python<'py>, indices: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
-        let (inner, places) = (Arc::clone(&self.inner), Arc::clone(&self.places));
-        let chosen: Vec<(usize, usize)> = indices.iter().map(|i| places[*i]).collect();
-        let of = chosen.clone();
-        let made = work::run(py, self.threads, move |stop| {
-            let make = |(group, item): &(usize, usize)| {
-                if stop.load(Ordering::Relaxed) {
-                    return Err(Refusal::new(Fault::Internal, "stopped"));
-                }
-                Ok(inner.bare_pair(*group, *item)?)
-            };
-            let pairs: Vec<Pair> = of.par_iter().map(make).collect::<Result<_, Refusal>>()?;
-            Stacked::new(&pairs)
-        })?;
+        let made = self.make(py, self.threads, &indices, |pairs| Stacked::new(&pairs))?;
+        let chosen: Vec<(usize, usize)> = indices.iter().map(|i| self.places[*i]).collect();
         let dict = PyDict::new(py);
         let n = chosen.len();
         let corruption: Vec<&str> =
@@ -163,6 +155,27 @@ impl Pairs {
 }
 
 impl Pairs {
+    /// What becomes of the pairs of these indices, which are made in parallel.
+    fn make<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        threads: usize,
+        indices: &[usize],
+        then: fn(Vec<Pair>) -> Result<T, Refusal>,
+    ) -> PyResult<T> {
+        let inner = Arc::clone(&self.inner);
+        let chosen: Vec<(usize, usize)> = indices.iter().map(|i| self.places[*i]).collect();
+        work::run(py, threads, move |stop| {
+            let make = |(group, item): &(usize, usize)| {
+                if stop.load(Ordering::Relaxed) {
+                    return Err(Refusal::new(Fault::Internal, "stopped"));
+                }
+                Ok(inner.bare_pair(*group, *item)?)
+            };
+            then(chosen.par_iter().map(make).collect::<Result<_, Refusal>>()?)
+        })
+    }
+
     fn described<'py>(&self, py: Python<'py>, pair: &Pair, group: usize) -> PyResult<Bound<'py, PyDict>> {
         let of = &self.inner.groups()[group];
         let dict = PyDict::new(py);

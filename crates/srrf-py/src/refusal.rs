@@ -5,6 +5,7 @@ use std::fmt;
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use srrf::ScaleDoubt;
 use srrf_args::Failure;
 use srrf_cloud::CloudError;
 use srrf_cloud::io::IoError;
@@ -87,6 +88,7 @@ impl From<srrf::Error> for Refusal {
         match error {
             E::Source(e) => Self::cloud("source", &e),
             E::Target(e) => Self::cloud("target", &e),
+            E::Scale(doubt) => Self::new(Fault::Input, other_units(&doubt)),
             E::Weights(_) | E::Device(_) | E::Calibration(_) => Self::new(Fault::Option, message),
             E::NoPose(_) | E::NoSkeleton | E::Refine(_) => Self::new(
                 Fault::NoPose,
@@ -97,11 +99,44 @@ impl From<srrf::Error> for Refusal {
     }
 }
 
+/// The switches of the program that are options of `srrf.read`.
+const READING: [&str; 7] = ["columns", "array", "layout", "scan", "topic", "message", "max-memory"];
+
+/// A message of the program, with the names that options have here.
+pub fn in_python(message: &str) -> String {
+    let mut said = message.to_owned();
+    for name in READING {
+        let option = format!("{}=", name.replace('-', "_"));
+        said = said.replace(&format!("--{name} "), &option).replace(&format!("--{name}"), &option);
+    }
+    match said == message {
+        true => said,
+        false => format!("{said} (options of srrf.read)"),
+    }
+}
+
+/// What speaks for two units, and the options that mend it.
+fn other_units(doubt: &ScaleDoubt) -> String {
+    let [source, target] = doubt.sizes;
+    let units = doubt.units().map_or_else(String::new, |[source, target]| {
+        format!(
+            ", as of {source} and {target}, which scale=srrf.unit_factor(\"{source}\", \"{target}\") mends"
+        )
+    });
+    format!(
+        "source and target seem to be in different units of length: their radii are {:.4e} and {:.4e}{units}; pass \
+         scale=FACTOR, what the source is to be multiplied by, scale=\"auto\" to estimate it, or scale=1 to take both as \
+         they are",
+        source.radius, target.radius
+    )
+}
+
 impl From<IoError> for Refusal {
     fn from(error: IoError) -> Self {
         let missing =
             matches!(&error, IoError::Read { source, .. } if source.kind() == std::io::ErrorKind::NotFound);
-        Self::new(if missing { Fault::MissingFile } else { Fault::File }, Failure::from(error).to_string())
+        let message = in_python(&Failure::from(error).to_string());
+        Self::new(if missing { Fault::MissingFile } else { Fault::File }, message)
     }
 }
 

@@ -24,6 +24,17 @@ pub enum WeightsError {
         /// The names of the models in the program.
         known: String,
     },
+    /// A model that other builds of the program have.
+    #[error(
+        "{name}: no such file, and this build is without that model (it has {known}); take \
+         crates/srrf-model/weights/{name}.safetensors from the repository, and give that file"
+    )]
+    NotInThisBuild {
+        /// What was asked for.
+        name: String,
+        /// The names of the models in the program.
+        known: String,
+    },
     /// The bytes are no safetensors file, or a truncated one.
     #[error("{origin}: not a complete safetensors file: {source}")]
     Format {

@@ -107,6 +107,7 @@ fn write(name: &str, used_as: &Path, output: &Path) -> Result<Option<String>, Fa
     })?;
     let bytes = match embedded::model(name) {
         Some(model) => model.weights.bytes.to_vec(),
+        None if !Path::new(name).exists() => return Err(unknown(name)),
         None => std::fs::read(name).map_err(|e| input(e, Path::new(name)))?,
     };
     let written = with_config(&bytes, name, &changed).map_err(Failure::input)?;
@@ -154,11 +155,7 @@ fn open(weights: &str) -> Result<LoadedModel, Failure> {
 }
 
 fn unknown(name: &str) -> Failure {
-    let known: Vec<&str> = embedded::names().collect();
-    Failure::usage(format!(
-        "{name:?}: no such file, and no model of that name; the program has {}",
-        known.join(", ")
-    ))
+    Failure::usage(embedded::unknown(name).to_string())
 }
 
 #[cfg(test)]

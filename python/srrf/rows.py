@@ -55,7 +55,7 @@ class PairRegistrar:
     def __init__(self, folder: str | os.PathLike[str] | None = None, **options: Any) -> None:
         self._folder = None if folder is None else os.fspath(folder)
         self._registrar = Registrar(**options)
-        self._last: tuple[str, Target] | None = None
+        self._last: tuple[str, Cloud | Target] | None = None
         options_of = self._registrar.options
         self._described = {
             "method": options_of["method"],
@@ -63,7 +63,7 @@ class PairRegistrar:
             "refine": options_of["refine"],
             "weights": options_of["weights"],
             "seed": options_of["seed"],
-            "scale": None,
+            "scale": options_of["scale"],
         }
 
     def row(self, pair: Mapping[str, Any]) -> dict[str, Any]:
@@ -124,14 +124,16 @@ class PairRegistrar:
                 table = table.append_column(name, pairs.column(name))
         return table
 
-    def _target(self, value: Any) -> Target:
-        """Prepared once for neighbours in the list that share it."""
+    def _target(self, value: Any) -> Cloud | Target:
+        """Prepared once for neighbours in the list that share it; a mesh as it is, since its source says how densely it is drawn."""
         cloud = self._cloud(value)
         if not isinstance(cloud, str):
             return self._registrar.prepare(cloud)
         if self._last is None or self._last[0] != cloud:
             self._last = None
-            self._last = (cloud, self._registrar.prepare(cloud))
+            opened = _srrf.open(cloud)
+            drawn = opened.is_mesh and not self._registrar.options["vertices"]
+            self._last = (cloud, cloud if drawn else Target(self._registrar, self._registrar._inner.prepare(opened)))
         return self._last[1]
 
     def _cloud(self, value: Any) -> Cloud:
