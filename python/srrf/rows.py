@@ -131,7 +131,7 @@ class PairRegistrar:
             return self._registrar.prepare(cloud)
         if self._last is None or self._last[0] != cloud:
             self._last = None
-            opened = _srrf.open(cloud)
+            opened = _srrf.open(cloud, None)
             drawn = opened.is_mesh and not self._registrar.options["vertices"]
             self._last = (cloud, cloud if drawn else Target(self._registrar, self._registrar._inner.prepare(opened)))
         return self._last[1]

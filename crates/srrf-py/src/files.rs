@@ -101,6 +101,7 @@ pub fn read<'py>(
 
 /// A file as the program reads it: without points that are no numbers or stand for "no return".
 #[pyfunction]
+#[pyo3(signature = (path, name = None))]
 pub fn open(py: Python<'_>, path: PathBuf, name: Option<String>) -> PyResult<Cloud> {
     work::run(py, work::threads(None)?, move |_| {
         // The library's own error first: it knows a file that is not there.
