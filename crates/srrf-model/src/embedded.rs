@@ -41,8 +41,8 @@ macro_rules! model {
 }
 
 /// The networks in the program, the default first. `weights/LINEAGE.toml` names these and what they were trained from.
-/// Those that are there to compare need the feature `every-network`.
-pub const MODELS: &[EmbeddedModel] = &[
+/// A static, so that a program holds each once. Those that are there to compare need the feature `every-network`.
+pub static MODELS: &[EmbeddedModel] = &[
     model!("srrf", card "srrf", registers true),
     #[cfg(feature = "every-network")]
     model!("srrf-small", card "srrf-small", registers true),
