@@ -133,8 +133,8 @@ mod tests {
         }
         assert!(load("srrf-large", &device).is_none());
         assert_eq!(open("srrf-shapes", &device).unwrap().name, "srrf-shapes");
-        let unknown = open("srrf-large", &device).unwrap_err().to_string();
-        assert!(unknown.contains("srrf-large: no such file") && unknown.contains("srrf-shapes"), "{unknown}");
+        let refused = open("srrf-large", &device).unwrap_err().to_string();
+        assert!(refused.contains("srrf-large: no such file") && refused.contains("srrf-shapes"), "{refused}");
         let left_out = unknown("srrf-small").to_string();
         assert!(left_out.contains("crates/srrf-model/weights/srrf-small.safetensors"), "{left_out}");
         assert_eq!(load_default(&device).unwrap().name, "srrf");

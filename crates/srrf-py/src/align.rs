@@ -132,7 +132,7 @@ fn to_json(map: &Map, scans: &Held) -> Value {
                 "abstain": scan.abstain,
                 "held_by": scan.held_by,
                 "centre": scan.centre.as_slice(),
-                "covariance": scan.covariance.map(|c| <[[f64; 6]; 6]>::from(c)),
+                "covariance": scan.covariance.map(<[[f64; 6]; 6]>::from),
                 "spread": scan.spread,
                 "undetermined": scan.undetermined,
                 "residual": scan.residual,

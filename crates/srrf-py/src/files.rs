@@ -18,7 +18,7 @@ use crate::work;
 /// How a file is read, as Python gives it.
 #[derive(Debug, FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Reading {
+pub struct AskedReading {
     columns: Option<String>,
     array: Option<String>,
     layout: Option<String>,
@@ -28,7 +28,7 @@ pub struct Reading {
     max_memory: Option<u64>,
 }
 
-impl Reading {
+impl AskedReading {
     fn options(self) -> Result<ReadOptions, Refusal> {
         Ok(ReadOptions {
             columns: parsed("columns", self.columns)?,
@@ -68,7 +68,7 @@ type ReadPoints<'py> = (Bound<'py, PyArray2<f64>>, Vec<String>);
 pub fn read<'py>(
     py: Python<'py>,
     path: PathBuf,
-    reading: Reading,
+    reading: AskedReading,
     vertices: Option<bool>,
     surface: Option<usize>,
     seed: u64,
@@ -118,7 +118,7 @@ type ScanRow<'py> = (String, u64, Option<Bound<'py, PyArray2<f64>>>);
 
 /// The scans of a file.
 #[pyfunction]
-pub fn scans<'py>(py: Python<'py>, path: PathBuf, reading: Reading) -> PyResult<Vec<ScanRow<'py>>> {
+pub fn scans<'py>(py: Python<'py>, path: PathBuf, reading: AskedReading) -> PyResult<Vec<ScanRow<'py>>> {
     let options = reading.options()?;
     let found =
         work::run(py, work::threads(None)?, move |_| Ok(CloudFile::open_with(&path, options)?.scans()?))?;

@@ -108,7 +108,7 @@ impl Pairs {
     /// The pairs of these indices as dictionaries of arrays: made in parallel.
     fn pairs<'py>(&self, py: Python<'py>, indices: Vec<usize>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let threads = if indices.len() == 1 { 1 } else { self.threads };
-        let made = self.make(py, threads, &indices, |pairs| Ok(pairs))?;
+        let made = self.make(py, threads, &indices, Ok)?;
         let dict = |(made, index): (Pair, usize)| {
             let dict = self.described(py, &made, self.places[index].0)?;
             dict.set_item("target_from_source", pose::matrix(py, &made.target_from_source)?)?;

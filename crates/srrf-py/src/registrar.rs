@@ -11,7 +11,7 @@ use crate::cloud::Cloud;
 use crate::options::{Asked, AskedScale, Scale};
 use crate::pose;
 use crate::refusal::{Fault, Refusal};
-use crate::surface::{Drawing, Drawn, refuse_mesh};
+use crate::surface::{Drawing, DrawnPair, refuse_mesh};
 use crate::work;
 
 /// Options and a loaded network.
@@ -110,7 +110,7 @@ impl PyRegistrar {
             let source = scaled(source, scale)?;
             let drawing =
                 Drawing { vertices, one_unit: scale != Scale::Auto, seed: registrar.options().seed };
-            let Drawn { source, target, surfaces } = drawing.apply(&source, &onto)?;
+            let DrawnPair { source, target, surfaces } = drawing.apply(&source, &onto)?;
             let laid_on: RequestTarget<'_> = match &ready {
                 Some(ready) => ready.into(),
                 None => (&*target.points).into(),

@@ -7,7 +7,7 @@ use crate::cloud::Cloud;
 use crate::refusal::{Fault, Refusal};
 
 /// What is to be registered, and what was made of meshes.
-pub struct Drawn {
+pub struct DrawnPair {
     pub source: Cloud,
     pub target: Cloud,
     pub surfaces: [Option<DrawnSurface>; 2],
@@ -28,7 +28,7 @@ impl Drawing {
     ///
     /// # Errors
     /// [`Fault::Input`] for a mesh whose faces make no surface.
-    pub fn apply(self, source: &Cloud, target: &Cloud) -> Result<Drawn, Refusal> {
+    pub fn apply(self, source: &Cloud, target: &Cloud) -> Result<DrawnPair, Refusal> {
         let clouds = [source, target];
         let meshes = [self.mesh(source)?, self.mesh(target)?];
         let draw = |i: usize| {
@@ -54,7 +54,7 @@ impl Drawing {
             (cloud, Some(DrawnSurface { vertices, faces, faces_left_out, draw }))
         };
         let [(source, of_source), (target, of_target)] = [draw(0), draw(1)];
-        Ok(Drawn { source, target, surfaces: [of_source, of_target] })
+        Ok(DrawnPair { source, target, surfaces: [of_source, of_target] })
     }
 
     /// The surface of a mesh; none of a cloud, and where the vertices are asked for.
