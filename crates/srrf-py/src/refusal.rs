@@ -55,6 +55,15 @@ impl Refusal {
         Self { fault, message: message.into() }
     }
 
+    /// Of a registration, with the names of its clouds.
+    pub fn registering(error: srrf::Error, source: &str, target: &str) -> Self {
+        match error {
+            srrf::Error::Source(e) => Self::cloud(source, &e),
+            srrf::Error::Target(e) => Self::cloud(target, &e),
+            other => other.into(),
+        }
+    }
+
     /// A cloud, by its name, that cannot be used.
     pub fn cloud(name: &str, error: &CloudError) -> Self {
         Self::new(Fault::Input, Failure::cloud(name, error).to_string())

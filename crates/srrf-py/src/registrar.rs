@@ -85,7 +85,10 @@ impl PyRegistrar {
         refuse_mesh(target, self.vertices, "a target made ready has no source whose density it could have")?;
         let (registrar, cloud) = (Arc::clone(&self.inner), target.clone());
         let points = Arc::clone(&cloud.points);
-        let inner = work::run(py, self.threads, move |_| Ok(registrar.prepare(&points)?))?;
+        let name = cloud.name.clone();
+        let inner = work::run(py, self.threads, move |_| {
+            registrar.prepare(&points).map_err(|e| Refusal::registering(e, &name, &name))
+        })?;
         Ok(PyTarget { inner, cloud })
     }
 
@@ -116,10 +119,11 @@ impl PyRegistrar {
                 None => (&*target.points).into(),
             };
             let request = Request { initial, ..Request::new(&source.points, laid_on) }.until(stop);
-            let mut outcome = match scale {
-                Scale::Auto => registrar.register_with_scale(&request)?,
-                _ => registrar.register(&request)?,
+            let found = match scale {
+                Scale::Auto => registrar.register_with_scale(&request),
+                _ => registrar.register(&request),
             };
+            let mut outcome = found.map_err(|e| Refusal::registering(e, &source.name, &target.name))?;
             outcome.surfaces = surfaces;
             if let Scale::Factor(factor) = scale {
                 outcome.scale = Some(AppliedScale { factor, spread: None, origin: ScaleOrigin::Given });
