@@ -20,6 +20,9 @@ from ._register import Registrar, Target
 
 _EVIDENCE = ("spacing", "inlier_threshold", "inliers", "fitness", "inlier_rmse", "overlap_target")
 
+#: The version of an answer in JSON.
+_VERSION = "srrf-register/1"
+
 #: The columns of an answer.
 SCHEMA = pa.schema(
     [
@@ -57,14 +60,15 @@ class PairRegistrar:
         self._registrar = Registrar(**options)
         self._last: tuple[str, Cloud | Target] | None = None
         options_of = self._registrar.options
-        self._described = {
+        self._described: dict[str, Any] = {
             "method": options_of["method"],
             "rotation": "45" if options_of["rotation"] == "45" else "180",
             "refine": options_of["refine"],
             "weights": options_of["weights"],
             "seed": options_of["seed"],
-            "scale": options_of["scale"],
         }
+        if options_of["scale"] is not None:
+            self._described["scale"] = options_of["scale"]
 
     def row(self, pair: Mapping[str, Any]) -> dict[str, Any]:
         """The answer for one pair, by the names of :data:`SCHEMA`."""
@@ -90,7 +94,7 @@ class PairRegistrar:
     def _described_row(
         self, identity: str, names: Mapping[str, str | None], carried: dict[str, Any], answer: dict[str, Any]
     ) -> dict[str, Any]:
-        answer |= {"id": identity, **names, "columns": carried, "options": self._described}
+        answer = {"schema": _VERSION} | answer | {"id": identity, **names, "columns": carried, "options": self._described}
         pose = answer.get("target_from_source")
         evidence = answer.get("evidence", {})
         points = answer.get("points", {})
