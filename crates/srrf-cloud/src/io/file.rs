@@ -171,8 +171,8 @@ impl CloudFile {
                 false => taken.join(", "),
             };
             return Err(FormatError::Content(format!(
-                "`{flag}` says nothing to a file of the format {name}, which takes {taken}; leave it out, or give it to \
-                 the other cloud alone, as `--source-{bare}` and `--target-{bare}` do",
+                "`{flag}` says nothing to a file of the format {name}, which takes {taken}; leave it out, or, where two \
+                 clouds are named, give it to the other one alone (`--source-{bare}`, `--target-{bare}`)",
                 bare = flag.trim_start_matches('-')
             )));
         }

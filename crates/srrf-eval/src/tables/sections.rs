@@ -66,6 +66,9 @@ pub(super) fn document(
         sections.push(section);
     }
     sections.retain(|s| !s.is_empty());
+    for text in sections.iter_mut().flat_map(|section| &mut section.text) {
+        *text = without_place(options.data.as_deref(), text);
+    }
     Ok(Document {
         title: "Registration of corrupted pairs: report".into(),
         facts: facts(options, evidence),

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
-use srrf::{Counterpart, SurfaceDraw};
 use srrf_align::Scans;
 use srrf_args::Failure;
 use srrf_args::files::{self, Input};
+use srrf_args::surface::{DrawnHow, SurfaceFlag};
 use srrf_cloud::io::{Attribute, ReadOptions};
-use srrf_cloud::{PointCloud, Rigid, TriangleMesh};
+use srrf_cloud::{PointCloud, Rigid};
 
 use super::align_places::{ScanFile, apart, expanded};
 
@@ -237,13 +237,10 @@ pub struct ScanAttributes {
 }
 
 fn read(place: &ScanFile, reading: &ScanReading) -> Result<OneScan, Failure> {
-    let input = files::read_solid(&place.path, None, reading.options.clone())?;
-    let Input { mut cloud, dropped, viewpoint, faces, name, .. } = input;
-    let drawn = if faces.is_empty() || reading.vertices { None } else { drawn(&cloud, &faces, &name)? };
-    let is_drawn = drawn.is_some();
-    if let Some(drawn) = drawn {
-        cloud = drawn;
-    }
+    let mut input = files::read_solid(&place.path, None, reading.options.clone())?;
+    let drawn = SurfaceFlag { vertices: reading.vertices }.draw_alone(&mut input, SEED)?;
+    let is_drawn = drawn.is_some_and(|drawn| matches!(drawn.how, DrawnHow::Points(..)));
+    let Input { cloud, dropped, viewpoint, .. } = input;
     let middle = cloud.middle();
     let size =
         cloud.points().iter().map(|p| (nalgebra::Vector3::from(*p) - middle).norm()).fold(0.0, f64::max);
@@ -257,20 +254,6 @@ fn read(place: &ScanFile, reading: &ScanReading) -> Result<OneScan, Failure> {
         viewpoint,
         drawn: is_drawn,
         cloud: Some(cloud),
-    })
-}
-
-/// Points of the surface of a mesh, where its vertices do not lie dense enough.
-fn drawn(cloud: &PointCloud, faces: &[[u32; 3]], name: &str) -> Result<Option<PointCloud>, Failure> {
-    let mesh = TriangleMesh::new(cloud.points(), faces).map_err(|e| {
-        Failure::usage(format!(
-            "{name:?}: {e}; mend the mesh, or take its vertices as a cloud with --vertices"
-        ))
-        .because(e)
-    })?;
-    Ok(match SurfaceDraw::for_counterpart(&mesh, cloud.len(), Counterpart::Surface(&mesh)) {
-        SurfaceDraw::Vertices => None,
-        SurfaceDraw::Surface { points, .. } => Some(mesh.sample(points, SEED)),
     })
 }
 
