@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use srrf::Outcome;
-
 use srrf_args::Failure;
 use srrf_args::files::Input;
 
