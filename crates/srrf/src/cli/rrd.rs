@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use srrf::Outcome;
 use srrf_args::Failure;
 use srrf_args::files::Input;
 
@@ -44,10 +45,9 @@ mod recording {
         LineStrips3D, Mat3x3, Points3D, RecordingStream, RecordingStreamBuilder, RecordingStreamResult,
         TextDocument, Transform3D, Vec3D,
     };
-    use srrf::Outcome;
     use srrf_cloud::{PointCloud, Rigid};
 
-    use super::{Failure, Input};
+    use super::{Failure, Input, Outcome};
     use srrf_args::files;
 
     const SOURCE: u32 = 0xD55E_00FF;
