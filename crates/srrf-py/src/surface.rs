@@ -1,7 +1,7 @@
 //! Meshes are surfaces: what has faces is drawn as densely as the cloud that it is registered with, as the program does.
 
-use srrf::{Counterpart, DrawnSurface, SurfaceDraw};
-use srrf_cloud::TriangleMesh;
+use srrf::{DrawnSurface, MeshedCloud, draw_pair};
+use srrf_cloud::{PointCloud, TriangleMesh};
 
 use crate::cloud::Cloud;
 use crate::refusal::{Fault, Refusal};
@@ -29,32 +29,17 @@ impl Drawing {
     /// # Errors
     /// [`Fault::Input`] for a mesh whose faces make no surface.
     pub fn apply(self, source: &Cloud, target: &Cloud) -> Result<DrawnPair, Refusal> {
-        let clouds = [source, target];
         let meshes = [self.mesh(source)?, self.mesh(target)?];
-        let draw = |i: usize| {
-            if !clouds[i].is_mesh() {
-                return (clouds[i].clone(), None);
-            }
-            let other = match (&meshes[1 - i], self.one_unit) {
-                (Some(mesh), _) => Counterpart::Surface(mesh),
-                (None, true) => Counterpart::Cloud(&clouds[1 - i].points),
-                (None, false) => Counterpart::CloudOfAnyScale(&clouds[1 - i].points),
-            };
-            let (vertices, mesh) = (clouds[i].points.len(), meshes[i].as_ref());
-            let draw = mesh.map(|mesh| SurfaceDraw::for_counterpart(mesh, vertices, other));
-            let cloud = match (mesh, draw) {
-                // Two meshes get draws of their own.
-                (Some(mesh), Some(SurfaceDraw::Surface { points, .. })) => {
-                    clouds[i].with_points(mesh.sample(points, self.seed.wrapping_add(i as u64)))
-                }
-                _ => clouds[i].clone(),
-            };
-            let faces_left_out = mesh.map_or(0, TriangleMesh::left_out) + clouds[i].lost_faces;
-            let faces = clouds[i].faces.len() + clouds[i].lost_faces;
-            (cloud, Some(DrawnSurface { vertices, faces, faces_left_out, draw }))
+        let pair = [meshed(source, meshes[0].as_ref()), meshed(target, meshes[1].as_ref())];
+        let [of_source, of_target] = draw_pair(pair, self.one_unit, self.seed);
+        let with = |cloud: &Cloud, points: Option<PointCloud>| {
+            points.map_or_else(|| cloud.clone(), |points| cloud.with_points(points))
         };
-        let [(source, of_source), (target, of_target)] = [draw(0), draw(1)];
-        Ok(DrawnPair { source, target, surfaces: [of_source, of_target] })
+        Ok(DrawnPair {
+            source: with(source, of_source.cloud),
+            target: with(target, of_target.cloud),
+            surfaces: [of_source.drawn, of_target.drawn],
+        })
     }
 
     /// The surface of a mesh; none of a cloud, and where the vertices are asked for.
@@ -68,6 +53,11 @@ impl Drawing {
             Refusal::new(Fault::Input, format!("{}: {e}; {way_out}", cloud.name))
         })
     }
+}
+
+fn meshed<'a>(cloud: &'a Cloud, mesh: Option<&'a TriangleMesh>) -> MeshedCloud<'a> {
+    let faces = cloud.faces.len() + cloud.lost_faces;
+    MeshedCloud { cloud: &cloud.points, mesh, faces, lost_faces: cloud.lost_faces }
 }
 
 /// Refuses a mesh where nothing says how densely it is to be drawn.

@@ -75,7 +75,7 @@ pub use skeleton::{FoundSkeleton, skeleton};
 pub use srrf_align::Map;
 pub use stage::{Stage, StageTime};
 pub use start::Start;
-pub use surface::{Counterpart, DrawnSurface, SurfaceDraw};
+pub use surface::{Counterpart, DrawnSurface, MeshedCloud, SurfaceDraw, SurfacePlan, draw_pair};
 pub use target::Target;
 pub use undetermined::Undetermined;
 pub use warning::Warning;

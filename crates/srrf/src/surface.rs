@@ -45,6 +45,55 @@ pub struct DrawnSurface {
     pub draw: Option<SurfaceDraw>,
 }
 
+/// A cloud that is registered, and may be the vertices of a mesh.
+#[derive(Debug, Clone, Copy)]
+pub struct MeshedCloud<'a> {
+    /// Points of the file.
+    pub cloud: &'a PointCloud,
+    /// Its surface; none of a cloud, and where the vertices are asked for.
+    pub mesh: Option<&'a TriangleMesh>,
+    /// Faces of the file, 0 of a cloud.
+    pub faces: usize,
+    /// How many of them have a corner that is NaN or infinite, and are not in the surface.
+    pub lost_faces: usize,
+}
+
+/// What becomes of a [`MeshedCloud`].
+#[derive(Debug, Default)]
+pub struct SurfacePlan {
+    /// What was made of the mesh; none of a cloud.
+    pub drawn: Option<DrawnSurface>,
+    /// The points drawn, where they are to replace the cloud.
+    pub cloud: Option<PointCloud>,
+}
+
+/// Draws the surfaces of source and target, each as densely as the other one is. `one_unit` says whether both are known to be in one
+/// unit of length. Two meshes get draws of their own, by `seed`.
+pub fn draw_pair(pair: [MeshedCloud<'_>; 2], one_unit: bool, seed: u64) -> [SurfacePlan; 2] {
+    [0, 1].map(|i| {
+        let MeshedCloud { cloud, mesh, faces, lost_faces } = pair[i];
+        if faces == 0 {
+            return SurfacePlan::default();
+        }
+        let other = pair[1 - i];
+        let counterpart = match (other.mesh, one_unit) {
+            (Some(mesh), _) => Counterpart::Surface(mesh),
+            (None, true) => Counterpart::Cloud(other.cloud),
+            (None, false) => Counterpart::CloudOfAnyScale(other.cloud),
+        };
+        let draw = mesh.map(|mesh| SurfaceDraw::for_counterpart(mesh, cloud.len(), counterpart));
+        let points = match (mesh, draw) {
+            (Some(mesh), Some(SurfaceDraw::Surface { points, .. })) => {
+                Some(mesh.sample(points, seed.wrapping_add(i as u64)))
+            }
+            _ => None,
+        };
+        let faces_left_out = mesh.map_or(0, TriangleMesh::left_out) + lost_faces;
+        let drawn = DrawnSurface { vertices: cloud.len(), faces, faces_left_out, draw };
+        SurfacePlan { drawn: Some(drawn), cloud: points }
+    })
+}
+
 impl SurfaceDraw {
     /// For a mesh of `vertices` vertices: as dense as what it is registered with, with [`LEAST_SAMPLES`] to [`MOST_SAMPLES`] points.
     pub fn for_counterpart(mesh: &TriangleMesh, vertices: usize, other: Counterpart<'_>) -> Self {

@@ -1,11 +1,11 @@
 //! Meshes are surfaces: what has faces is drawn as densely as the cloud that it is registered with.
 
 use clap::Args;
-use srrf::{Counterpart, DrawnSurface, SurfaceDraw};
+use srrf::{DrawnSurface, MeshedCloud, SurfaceDraw, SurfacePlan, draw_pair};
 use srrf_args::Failure;
 use srrf_args::files::Input;
 use srrf_args::surface::{self, DrawnHow, mesh};
-use srrf_cloud::{PointCloud, TriangleMesh};
+use srrf_cloud::TriangleMesh;
 
 /// How meshes become clouds.
 #[derive(Debug, Clone, Copy, Args)]
@@ -39,7 +39,7 @@ impl SurfaceArgs {
         seed: u64,
     ) -> Result<[Option<DrawnSurface>; 2], Failure> {
         let [of_source, of_target] = self.plan(source, target, one_unit, seed)?;
-        Ok([of_source.apply(source), of_target.apply(target)])
+        Ok([apply(of_source, source), apply(of_target, target)])
     }
 
     /// As [`draw`](Self::draw), with a target that is no mesh.
@@ -54,7 +54,7 @@ impl SurfaceArgs {
         seed: u64,
     ) -> Result<[Option<DrawnSurface>; 2], Failure> {
         let [of_source, of_target] = self.plan(source, target, one_unit, seed)?;
-        Ok([of_source.apply(source), of_target.drawn])
+        Ok([apply(of_source, source), of_target.drawn])
     }
 
     /// Whether points are drawn from a cloud's surface, or may be.
@@ -69,48 +69,22 @@ impl SurfaceArgs {
         one_unit: bool,
         seed: u64,
     ) -> Result<[SurfacePlan; 2], Failure> {
-        let inputs = [source, target];
         let meshes = [mesh(source, self.vertices)?, mesh(target, self.vertices)?];
-        let other = |i: usize| match (&meshes[1 - i], one_unit) {
-            (Some(mesh), _) => Counterpart::Surface(mesh),
-            (None, true) => Counterpart::Cloud(&inputs[1 - i].cloud),
-            (None, false) => Counterpart::CloudOfAnyScale(&inputs[1 - i].cloud),
-        };
-        Ok([0, 1].map(|i| {
-            let faces = inputs[i].faces.len() + inputs[i].lost_faces;
-            if faces == 0 {
-                return SurfacePlan::default();
-            }
-            let (vertices, mesh) = (inputs[i].cloud.len(), meshes[i].as_ref());
-            let draw = mesh.map(|mesh| SurfaceDraw::for_counterpart(mesh, vertices, other(i)));
-            let cloud = match (mesh, draw) {
-                // Two meshes get draws of their own.
-                (Some(mesh), Some(SurfaceDraw::Surface { points, .. })) => {
-                    Some(mesh.sample(points, seed.wrapping_add(i as u64)))
-                }
-                _ => None,
-            };
-            let faces_left_out = mesh.map_or(0, TriangleMesh::left_out) + inputs[i].lost_faces;
-            SurfacePlan { drawn: Some(DrawnSurface { vertices, faces, faces_left_out, draw }), cloud }
-        }))
+        let pair = [meshed(source, meshes[0].as_ref()), meshed(target, meshes[1].as_ref())];
+        Ok(draw_pair(pair, one_unit, seed))
     }
 }
 
-/// What becomes of an input.
-#[derive(Debug, Default)]
-struct SurfacePlan {
-    drawn: Option<DrawnSurface>,
-    /// Where it is not its vertices.
-    cloud: Option<PointCloud>,
+fn meshed<'a>(input: &'a Input, mesh: Option<&'a TriangleMesh>) -> MeshedCloud<'a> {
+    let faces = input.faces.len() + input.lost_faces;
+    MeshedCloud { cloud: &input.cloud, mesh, faces, lost_faces: input.lost_faces }
 }
 
-impl SurfacePlan {
-    fn apply(self, input: &mut Input) -> Option<DrawnSurface> {
-        if let Some(cloud) = self.cloud {
-            input.cloud = cloud;
-        }
-        self.drawn
+fn apply(plan: SurfacePlan, input: &mut Input) -> Option<DrawnSurface> {
+    if let Some(cloud) = plan.cloud {
+        input.cloud = cloud;
     }
+    plan.drawn
 }
 
 #[cfg(test)]
