@@ -66,14 +66,12 @@ pub(super) fn document(
         sections.push(section);
     }
     sections.retain(|s| !s.is_empty());
-    for text in sections.iter_mut().flat_map(|section| &mut section.text) {
+    let mut facts = facts(options, evidence);
+    let texts = sections.iter_mut().flat_map(|section| &mut section.text);
+    for text in texts.chain(facts.iter_mut().map(|(_, value)| value)) {
         *text = without_place(options.data.as_deref(), text);
     }
-    Ok(Document {
-        title: "Registration of corrupted pairs: report".into(),
-        facts: facts(options, evidence),
-        sections,
-    })
+    Ok(Document { title: "Registration of corrupted pairs: report".into(), facts, sections })
 }
 
 /// Where the numbers come from. Nothing here differs between two runs of the same command.
@@ -81,7 +79,7 @@ fn facts(options: &TablesOptions, evidence: &TablesEvidence) -> Vec<(String, Str
     let mut facts = Vec::new();
     let mut fact = |name: &str, value: String| facts.push((name.to_owned(), value));
     if let Some(measured) = evidence.parts.get("main").or_else(|| evidence.parts.values().next()) {
-        fact("Data", without_place(options.data.as_deref(), &measured.data));
+        fact("Data", measured.data.clone());
     }
     fact("Shapes", evidence.shapes.to_string());
     fact("Seed", options.seed.to_string());
@@ -93,7 +91,7 @@ fn facts(options: &TablesOptions, evidence: &TablesEvidence) -> Vec<(String, Str
     }
     // The places of the program, of the data and of the report are no part of the command.
     let arguments: Vec<String> = std::env::args().skip(1).map(|argument| without_folder(&argument)).collect();
-    fact("Command", without_place(options.data.as_deref(), &format!("srrf-eval {}", arguments.join(" "))));
+    fact("Command", format!("srrf-eval {}", arguments.join(" ")));
     fact("Program", format!("srrf-eval {}, device {}", env!("CARGO_PKG_VERSION"), options.device));
     fact("Machine", crate::report::machine());
     fact("Time of all answers", format!("{:.0} s on one thread each", seconds(evidence)));
