@@ -1,5 +1,6 @@
-//! Puts a fingerprint of the code that answers pairs into the program, so that answers kept by an
-//! older program are not taken for those of this one.
+//! Puts fingerprints of the code that answers pairs into the program, so that answers kept by an older
+//! program are not taken for those of this one: one of the methods, and one of the product, which has
+//! its own search and calibration on top.
 
 #![allow(clippy::print_stdout, reason = "a build script talks to cargo by printing")]
 
@@ -7,22 +8,32 @@ use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 /// Crates whose code a method's answer may depend on, beside this one.
-const CRATES: [&str; 6] =
-    ["srrf-cloud", "srrf-model", "srrf-refine", "srrf-classical", "srrf-baselines", "srrf"];
+const METHODS: [&str; 5] = ["srrf-cloud", "srrf-model", "srrf-refine", "srrf-classical", "srrf-baselines"];
+/// The crate that the rows of the product depend on, beside those.
+const PRODUCT: &str = "srrf";
+/// What answers no pair: readers and writers of files (an answer is known by its points) and command lines.
+const LEFT_OUT: [&str; 2] = ["io", "cli"];
 
 fn main() -> io::Result<()> {
     let crates = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default()).join("..");
     let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
-    for name in CRATES {
-        let folder = crates.join(name).join("src");
-        println!("cargo::rerun-if-changed={}", folder.display());
-        add(&folder, &mut hash)?;
+    for name in METHODS {
+        add_crate(&crates, name, &mut hash)?;
     }
     let lock = crates.join("../Cargo.lock");
     println!("cargo::rerun-if-changed={}", lock.display());
     hash.add(&fs::read(lock)?);
     println!("cargo::rustc-env=SRRF_METHODS_CODE={:016x}", hash.0);
+    add_crate(&crates, PRODUCT, &mut hash)?;
+    println!("cargo::rustc-env=SRRF_PRODUCT_CODE={:016x}", hash.0);
     Ok(())
+}
+
+/// The sources of a crate.
+fn add_crate(crates: &Path, name: &str, hash: &mut Fnv) -> io::Result<()> {
+    let folder = crates.join(name).join("src");
+    println!("cargo::rerun-if-changed={}", folder.display());
+    add(&folder, hash)
 }
 
 /// Every file under `folder`, by name.
@@ -32,7 +43,9 @@ fn add(folder: &Path, hash: &mut Fnv) -> io::Result<()> {
     entries.sort();
     for path in entries {
         if path.is_dir() {
-            add(&path, hash)?;
+            if !LEFT_OUT.iter().any(|name| path.ends_with(name)) {
+                add(&path, hash)?;
+            }
         } else {
             hash.add(path.file_name().unwrap_or_default().as_encoded_bytes());
             hash.add(&fs::read(path)?);

@@ -2,7 +2,7 @@
 //! of the same command computes nothing.
 //!
 //! One file, `answers.jsonl`, to which a line is appended for each answer: the key, a checksum, the
-//! answer as JSON, with spaces between. An answer whose checksum is another one is computed anew. A key is a hash of all that an answer depends on: the code of the methods, the
+//! answer as JSON, with spaces between. An answer whose checksum is another one is computed anew. A key is a hash of all that an answer depends on: the code of the method, the
 //! device, the method with its weights and settings, the two clouds and the true pose. A line that a
 //! kill tore is ignored, and so is one that another version wrote.
 
@@ -20,7 +20,7 @@ use crate::kept::KeptAnswer;
 use crate::methods::ReadyMethod;
 
 /// Changes with the meaning of keys and lines.
-const FORMAT: &str = "srrf-eval answers 2";
+const FORMAT: &str = "srrf-eval answers 3";
 /// Name of the file in the folder.
 const FILE: &str = "answers.jsonl";
 /// Hexadecimal digits of a key: 128 bits.
@@ -64,7 +64,6 @@ impl Cache {
         let lines = open(folder, &path).map_err(|source| EvalError::Cache { path: path.clone(), source })?;
         let common = Sha256::new()
             .chain_update(FORMAT)
-            .chain_update(env!("SRRF_METHODS_CODE"))
             .chain_update(part(device.as_bytes()));
         Ok(Self { path, common, lines: Mutex::new(lines) })
     }
@@ -131,6 +130,7 @@ impl Cache {
         let hash = self
             .common
             .clone()
+            .chain_update(method.code)
             .chain_update(part(method.register.name().as_bytes()))
             .chain_update(part(method.weights.as_deref().unwrap_or_default().as_bytes()))
             .chain_update(part(method.settings.as_bytes()))
@@ -203,6 +203,7 @@ mod tests {
     use srrf_corrupt::{Bases, Label, PairConfig, PairSynthesizer, PoseDraw, Stream};
 
     use super::*;
+    use crate::methods::PRODUCT_CODE;
 
     fn method(settings: &str) -> ReadyMethod {
         ReadyMethod { settings: settings.into(), ..ReadyMethod::new(Identity) }
@@ -237,6 +238,16 @@ mod tests {
             assert_eq!(cache.reused(), 2);
         }
         assert_eq!(Cache::open(folder.path(), "cuda").unwrap().get(&method(""), &a), None);
+    }
+
+    #[test]
+    fn answers_of_the_product_have_keys_of_their_own_code() {
+        let folder = tempfile::tempdir().unwrap();
+        let hash = Cache::pair_hash(&pair(1));
+        let cache = Cache::open(folder.path(), "flex").unwrap();
+        cache.put(&method(""), &hash, &found(1.0)).unwrap();
+        let product = ReadyMethod { code: PRODUCT_CODE, ..method("") };
+        assert_eq!(cache.get(&product, &hash), None);
     }
 
     #[test]

@@ -15,6 +15,11 @@ use srrf_refine::{RefineConfig, Refined};
 
 use crate::rows::TableRow;
 
+/// Fingerprint of the code of the methods, for the answers that a [`Cache`](crate::Cache) keeps.
+const METHODS_CODE: &str = env!("SRRF_METHODS_CODE");
+/// Fingerprint of that code and of the product's.
+pub(crate) const PRODUCT_CODE: &str = env!("SRRF_PRODUCT_CODE");
+
 /// What the entries of the registry may need to set up a method.
 #[derive(Debug, Clone)]
 pub struct MethodContext {
@@ -99,6 +104,8 @@ pub struct ReadyMethod {
     pub settings: String,
     /// Its name where the program knows it, for `--profile`.
     pub(crate) stage: &'static str,
+    /// Fingerprint of the code that its answers depend on.
+    pub(crate) code: &'static str,
 }
 
 impl ReadyMethod {
@@ -111,6 +118,7 @@ impl ReadyMethod {
             weights: None,
             settings: String::new(),
             stage: "another method",
+            code: METHODS_CODE,
         }
     }
 
@@ -319,7 +327,7 @@ fn product(context: &MethodContext, rotation: RotationRange) -> Result<ReadyMeth
     };
     let settings = options.to_string();
     let method = ReadyMethod::new(srrf::Registrar::new(options)?).with_weights(weights);
-    Ok(ReadyMethod { settings, ..method })
+    Ok(ReadyMethod { settings, code: PRODUCT_CODE, ..method })
 }
 
 /// The network of `--weights`, or the one in the program, and where it comes from, in words.
