@@ -33,7 +33,7 @@ impl FeatureMatches {
         let all = || self.pairs.iter().chain(more);
         let source = all().map(|(i, _)| self.source[*i as usize]).collect();
         let target = all().map(|(_, j)| self.target[*j as usize]).collect();
-        Correspondences::new(source, target).map_err(|e| RegisterError::NoPose(e.to_string()))
+        Correspondences::new(source, target).map_err(|e| RegisterError::NoPose(e.into()))
     }
 }
 
@@ -55,7 +55,7 @@ pub(crate) fn correspond(
             let (source, target) = (source.thinned(voxel, most)?, target.thinned(voxel, most)?);
             Ok(source.zip(target))
         })
-        .map_err(|e| RegisterError::NoPose(e.to_string()))?;
+        .map_err(|e| RegisterError::NoPose(e.into()))?;
     let radius = feature_voxels * voxel;
     let of = if feature_voxels > WIDE { NeighbourChoice::Throughout } else { NeighbourChoice::Nearest };
     let a = source.described(radius, of).map_err(RegisterError::Source)?;

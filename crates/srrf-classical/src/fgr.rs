@@ -76,11 +76,14 @@ impl Register for Fgr {
         let matches = correspond(&source_ready, &target_ready, config.points, config.feature_voxels, 30)?;
         let pairs = tuple_test(&matches, config);
         if pairs.len() < 3 {
-            return Err(RegisterError::NoPose(format!(
-                "{} of {} matches pass the tuple test, at least 3 are needed; lower `tuple_scale`",
-                pairs.len(),
-                matches.pairs.len()
-            )));
+            return Err(RegisterError::NoPose(
+                format!(
+                    "{} of {} matches pass the tuple test, at least 3 are needed; lower `tuple_scale`",
+                    pairs.len(),
+                    matches.pairs.len()
+                )
+                .into(),
+            ));
         }
         let pose = optimise(&pairs, config.distance_voxels * matches.voxel, config);
         let Some(refine) = &config.refine else {

@@ -87,11 +87,14 @@ impl FpfhRansac {
         };
         let (found, drawn) = search.poses(&matches.correspondences(false)?);
         if found.is_empty() {
-            return Err(RegisterError::NoPose(format!(
-                "none of {drawn} samples of {} matches was consistent; the clouds may not overlap, or \
+            return Err(RegisterError::NoPose(
+                format!(
+                    "none of {drawn} samples of {} matches was consistent; the clouds may not overlap, or \
                  `distance_voxels` is too small",
-                matches.pairs.len()
-            )));
+                    matches.pairs.len()
+                )
+                .into(),
+            ));
         }
         Ok(Hypotheses { poses: found.iter().map(|p| p.target_from_source).collect(), drawn })
     }
@@ -116,7 +119,7 @@ impl FpfhRansac {
         let all = matches.correspondences(true)?;
         let found = search.poses(&all);
         if found.is_empty() {
-            return Err(RegisterError::NoPose(format!("no three of {} matches agree", all.len())));
+            return Err(RegisterError::NoPose(format!("no three of {} matches agree", all.len()).into()));
         }
         Ok(Hypotheses { poses: found.iter().map(|p| p.target_from_source).collect(), drawn: 0 })
     }

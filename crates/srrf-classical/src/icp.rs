@@ -78,7 +78,7 @@ impl Register for Icp {
                     matched_source.len(),
                     source.len(),
                     limit.sqrt()
-                ))
+                ).into())
             })?;
             let step = rms_between(&source, &pose, &next);
             pose = next;

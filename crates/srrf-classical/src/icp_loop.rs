@@ -65,7 +65,9 @@ impl Scene {
                 sums.add(m, metric.0 * w, metric.1 * w);
             }
             let next = sums.step(&pose, self.radius).ok_or_else(|| {
-                RegisterError::NoPose(format!("iteration {}: the matches determine no step", iterations + 1))
+                RegisterError::NoPose(
+                    format!("iteration {}: the matches determine no step", iterations + 1).into(),
+                )
             })?;
             iterations += 1;
             // How far the source moves, against the size of the target.

@@ -18,7 +18,7 @@ pub enum RegisterError {
     Device(#[source] Box<dyn std::error::Error + Send + Sync>),
     /// The method ran and found no pose.
     #[error("no pose found: {0}")]
-    NoPose(String),
+    NoPose(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
 
 /// Which of the poses that a method finds on its way to its answer.

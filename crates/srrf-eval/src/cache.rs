@@ -62,9 +62,7 @@ impl Cache {
     pub fn open(folder: &Path, device: &str) -> Result<Self, EvalError> {
         let path = folder.join(FILE);
         let lines = open(folder, &path).map_err(|source| EvalError::Cache { path: path.clone(), source })?;
-        let common = Sha256::new()
-            .chain_update(FORMAT)
-            .chain_update(part(device.as_bytes()));
+        let common = Sha256::new().chain_update(FORMAT).chain_update(part(device.as_bytes()));
         Ok(Self { path, common, lines: Mutex::new(lines) })
     }
 

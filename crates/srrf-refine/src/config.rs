@@ -156,7 +156,7 @@ impl From<RefineError> for RegisterError {
         match error {
             RefineError::Source(e) => Self::Source(e),
             RefineError::Target(e) => Self::Target(e),
-            other => Self::NoPose(other.to_string()),
+            other => Self::NoPose(Box::new(other)),
         }
     }
 }

@@ -35,8 +35,8 @@ impl From<Error> for RegisterError {
             Error::Target(e) => Self::Target(e),
             Error::Refine(e) => e.into(),
             Error::Copy(e) => e.into(),
-            Error::NoPose(why) => Self::NoPose(why.to_string()),
-            other => Self::NoPose(other.to_string()),
+            Error::NoPose(why) => Self::NoPose(Box::new(why)),
+            other => Self::NoPose(Box::new(other)),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The network as a source of starts.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -79,7 +79,7 @@ impl Network {
 pub struct LazyNetwork {
     weights: Option<String>,
     device: String,
-    loaded: OnceLock<Result<Network, String>>,
+    loaded: OnceLock<Result<Network, Arc<Error>>>,
 }
 
 impl LazyNetwork {
@@ -102,8 +102,8 @@ impl LazyNetwork {
     /// # Errors
     /// [`RegisterError::NoPose`] where it cannot be loaded.
     pub fn get(&self) -> Result<&Network, RegisterError> {
-        let load = || Network::load(self.weights.as_deref(), &self.device).map_err(|e| e.to_string());
-        self.loaded.get_or_init(load).as_ref().map_err(|why| RegisterError::NoPose(why.clone()))
+        let load = || Network::load(self.weights.as_deref(), &self.device).map_err(Arc::new);
+        self.loaded.get_or_init(load).as_ref().map_err(|why| RegisterError::NoPose(Box::new(Arc::clone(why))))
     }
 }
 

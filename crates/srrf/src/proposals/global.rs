@@ -199,7 +199,7 @@ fn within(poses: Vec<Rigid>, given: &Rigid) -> Result<Vec<Rigid>, RegisterError>
         return Err(RegisterError::NoPose(format!(
             "each of {count} poses is turned by more than {WITHIN_DEG} degrees against the given one; the rotation range \
              45 excludes them, 180 does not"
-        )));
+        ).into()));
     }
     Ok(kept)
 }
