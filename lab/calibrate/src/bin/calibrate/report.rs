@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
 use crate::Example;
 use crate::pairs::Group;
 
@@ -21,12 +23,28 @@ fn calibration_error(pairs: &[Said]) -> f64 {
         .sum()
 }
 
+/// Draws behind [`chance_error`].
+const DRAWS: usize = 1000;
+
+/// The calibration error that perfect probabilities would show on so few pairs: the mean over draws in which each pose is
+/// right with its probability.
+fn chance_error(pairs: &[Said]) -> f64 {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut drawn = pairs.to_vec();
+    let errors = (0..DRAWS).map(|_| {
+        drawn.iter_mut().for_each(|(p, right)| *right = rng.random_bool(p.clamp(0.0, 1.0)));
+        calibration_error(&drawn)
+    });
+    errors.sum::<f64>() / DRAWS as f64
+}
+
 fn brier(pairs: &[Said]) -> f64 {
     let squares = pairs.iter().map(|(p, r)| (p - f64::from(u8::from(*r))).powi(2)).sum::<f64>();
     squares / pairs.len().max(1) as f64
 }
 
-/// One row: pairs, right, mean probability, answered, right of the answered, answered of the right, Brier score, calibration error.
+/// One row: pairs, right, mean probability, answered, right of the answered, answered of the right, Brier score, calibration error,
+/// and what perfect probabilities would have of it.
 fn row(name: &str, pairs: &[Said]) -> String {
     let n = pairs.len() as f64;
     let percent = |some: usize, of: usize| match of {
@@ -38,7 +56,7 @@ fn row(name: &str, pairs: &[Said]) -> String {
     let both = answered.iter().filter(|(_, r)| *r).count();
     let mean = pairs.iter().map(|(p, _)| p).sum::<f64>() / n;
     format!(
-        "| {name} | {} | {} | {mean:.2} | {} | {} | {} | {:.3} | {:.3} |\n",
+        "| {name} | {} | {} | {mean:.2} | {} | {} | {} | {:.3} | {:.3} | {:.3} |\n",
         pairs.len(),
         percent(right, pairs.len()),
         percent(answered.len(), pairs.len()),
@@ -46,11 +64,12 @@ fn row(name: &str, pairs: &[Said]) -> String {
         percent(both, right),
         brier(pairs),
         calibration_error(pairs),
+        chance_error(pairs),
     )
 }
 
-const HEAD: &str = "| pairs | number | right % | mean probability | answered % | right of answered % | answered of right % | Brier score | calibration error |\n\
-                    |---|--:|--:|--:|--:|--:|--:|--:|--:|\n";
+const HEAD: &str = "| pairs | number | right % | mean probability | answered % | right of answered % | answered of right % | Brier score | calibration error | by chance |\n\
+                    |---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
 
 /// The tables of these examples, whose probabilities `says` gives.
 pub fn tables(examples: &[&Example], says: impl Fn(&Example) -> f64) -> String {
@@ -90,4 +109,20 @@ pub fn tables(examples: &[&Example], says: impl Fn(&Example) -> f64) -> String {
         let _ = writeln!(out, "| {low:.1} to {high:.1} | {} | {mean:.2} | {right:.2} |", inside.len());
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn perfect_probabilities_show_less_of_an_error_on_more_pairs() {
+        let said = |count: usize| -> Vec<Said> {
+            (0..count).map(|i| ((i % 10) as f64 / 10.0 + 0.05, false)).collect()
+        };
+        let (few, many) = (chance_error(&said(100)), chance_error(&said(10_000)));
+        // Ten of 100 pairs in each bin: a mean distance of about 0.1; a hundred times the pairs, a tenth of it.
+        assert!((0.07..0.13).contains(&few) && (8.0..12.0).contains(&(few / many)), "{few} {many}");
+        assert_eq!(chance_error(&[(1.0, true), (0.0, false)]), 0.0);
+    }
 }
