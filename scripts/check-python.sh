@@ -89,7 +89,7 @@ venv=$scratch/venv
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -1)
 cd "$scratch"
 [ "$("$venv/bin/python" -c 'import srrf; print(srrf.__version__)')" = "$version" ] || { echo "the versions differ" >&2; exit 1; }
-"$venv/bin/pip" show srrf | grep -qx "Version: $version" || { echo "the package's version is not $version" >&2; exit 1; }
+[ "$("$venv/bin/python" -c 'import importlib.metadata as m; print(m.version("srrf"))')" = "$version" ] || { echo "the package's version is not $version" >&2; exit 1; }
 [ "$("$venv/bin/srrf" --version)" = "srrf $version" ] || { echo "the program does not start" >&2; exit 1; }
 cd - >/dev/null
 site=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
