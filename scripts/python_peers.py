@@ -17,11 +17,12 @@ import tempfile
 import time
 from pathlib import Path
 
+# NumPy by name: without it small_gicp 1.0.1 does not import, and it does not ask for it.
 PEERS = {
-    "srrf": (None, "srrf"),
-    "Open3D 0.20.0": ("open3d==0.20.0", "open3d"),
-    "small_gicp 1.0.1": ("small-gicp==1.0.1", "small_gicp"),
-    "kiss-matcher 1.0.2": ("kiss-matcher==1.0.2", "kiss_matcher"),
+    "srrf": ([], "srrf"),
+    "Open3D 0.20.0": (["open3d==0.20.0"], "open3d"),
+    "small_gicp 1.0.1": (["small-gicp==1.0.1", "numpy"], "small_gicp"),
+    "kiss-matcher 1.0.2": (["kiss-matcher==1.0.2", "numpy"], "kiss_matcher"),
 }
 # Makes the object that registers, and an answer.
 MAKE = {
@@ -51,14 +52,14 @@ def size(folder):
     return sum(f.lstat().st_size for f in Path(folder).rglob("*") if f.is_file() and not f.is_symlink())
 
 
-def measure(name, requirement, module, folder):
+def measure(name, requirements, module, folder):
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     python = str(Path(folder) / "bin/python")
     site = subprocess.run([python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"], check=True,
                           capture_output=True, text=True).stdout.strip()
     empty = size(site)
     subprocess.run([python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-compile",
-                    "--only-binary", ":all:", requirement], check=True)
+                    "--only-binary", ":all:", *requirements], check=True)
     with_all = size(site) - empty
     own = sum(size(Path(site) / entry) for entry in os.listdir(site) if entry.replace("-", "_").startswith(module))
     seconds = []
@@ -84,12 +85,16 @@ def measure(name, requirement, module, folder):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--wheel", required=True)
-    wheel = parser.parse_args().wheel
+    parser.add_argument("--only", help="one of them, such as kiss_matcher")
+    arguments = parser.parse_args()
+    wheel = arguments.wheel
     print("| | package, MB | with all it asks for, MB | import, s | NumPy alone, s | object pickles | answer pickles | types |")
     print("|---|---|---|---|---|---|---|---|")
-    for name, (requirement, module) in PEERS.items():
+    for name, (requirements, module) in PEERS.items():
+        if arguments.only not in (None, module):
+            continue
         with tempfile.TemporaryDirectory() as folder:
-            row = measure(name, requirement or wheel, module, folder)
+            row = measure(name, requirements or [wheel], module, folder)
         print("| {} | {:.1f} | {:.1f} | {:.2f} | {:.2f} | {} | {} | {} |".format(*row), flush=True)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from . import _srrf
 from ._arrays import Cloud, cloud_of, pose_of
 from ._errors import InputError, InputTypeError
-from ._register import Method, Rotation, _options, _registrar
+from ._options import truth
+from ._register import Method, Rotation, checked_options, _registrar
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +127,7 @@ def align(
         InputError: for fewer than two scans, a scan that determines no rotation, and meshes without ``vertices=True``.
         OptionError: for options that make no sense.
     """
-    if isinstance(clouds, (str, os.PathLike, np.ndarray)):
+    if isinstance(clouds, (str, bytes, os.PathLike, np.ndarray, Mapping)) or not hasattr(clouds, "__iter__"):
         raise InputTypeError("clouds: expected a list of clouds; pass [first, second, ...]")
     given = list(clouds)
     guesses: list[Any] = [] if initial is None else list(initial)
@@ -134,7 +135,7 @@ def align(
         raise InputError(f"{len(guesses)} first guesses, but {len(given)} clouds; pass one for each, or None for some")
     scans = [cloud_of(cloud, None, f"clouds[{index}]") for index, cloud in enumerate(given)]
     poses = [None if guess is None else pose_of(guess, f"initial[{i}]") for i, guess in enumerate(guesses)]
-    options = _options(
+    options = checked_options(
         method=method,
         rotation=rotation,
         refine=refine,
@@ -146,4 +147,4 @@ def align(
         scale=1.0,  # scans of one building differ in size
         num_threads=num_threads,
     )
-    return Map(_srrf.align(_registrar(options)._inner, scans, poses, bool(sequence), bool(joint)))
+    return Map(_srrf.align(_registrar(options)._inner, scans, poses, truth("sequence", sequence), truth("joint", joint)))

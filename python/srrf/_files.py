@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _srrf
-from ._arrays import Cloud, points_of
+from ._arrays import Cloud, faces_of, points_of
 from ._errors import InputError, OptionError, ReadingWarning
+from ._options import whole
 
 #: Units of length.
 Unit = Literal["um", "mm", "cm", "m", "km", "in", "ft", "us-ft"]
@@ -82,12 +83,12 @@ def read(
         _from_1("surface_points", surface_points)
         if vertices is not False:
             raise OptionError("surface_points says how many points are drawn from a surface; pass vertices=False with it")
-    if not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**64:
-        raise OptionError(f"seed is {seed!r}: expected a whole number from 0 to 2**64 - 1")
+    seed = whole("seed", seed, 0, 2**64 - 1)
+    path = os.fsdecode(path)
     reading = _reading(columns, array, layout, scan, topic, message, max_memory)
-    points, said = _srrf.read(path, reading, vertices, surface_points, int(seed))
+    points, said = _srrf.read(path, reading, vertices, surface_points, seed)
     for sentence in said:
-        warnings.warn(f"{os.fspath(path)}: {sentence}", ReadingWarning, stacklevel=2)
+        warnings.warn(f"{path}: {sentence}", ReadingWarning, stacklevel=2)
     return points if factor == 1.0 else points * factor
 
 
@@ -109,7 +110,7 @@ def scans(
     Raises:
         FileError: as :func:`read`.
     """
-    found = _srrf.scans(path, _reading(columns, array, layout, None, topic, None, max_memory))
+    found = _srrf.scans(os.fsdecode(path), _reading(columns, array, layout, None, topic, None, max_memory))
     return [Scan(number, name, points, pose) for number, (name, points, pose) in enumerate(found, 1)]
 
 
@@ -123,7 +124,7 @@ def write(
 ) -> None:
     """Writes points, shape (N, >= 3), in the format that the extension says; the file appears whole or not at all.
 
-    What is read back is the same in every bit, but for formats that hold less (KITTI's ``.bin``, binary STL, LAS) and where
+    Of a mesh its vertices are written, and a :class:`ReadingWarning` says so. What is read back is the same in every bit, but for formats that hold less (KITTI's ``.bin``, binary STL, LAS) and where
     single precision was asked for.
 
     Args:
@@ -140,7 +141,9 @@ def write(
         OptionError: for units that do not exist.
     """
     factor = _factor(unit, to)
+    path = os.fsdecode(path)
     array = points_of(points, "points")
+    faces = faces_of(points, len(array), "points")
     if single is None:
         single = array.dtype == np.float32
     if factor != 1.0:
@@ -148,9 +151,12 @@ def write(
     cloud = _srrf.Cloud(array, "points")
     if cloud.dropped:
         raise InputError(f"points: {cloud.dropped} of them hold NaN or infinity; remove them first")
+    if faces is not None:
+        sentence = f"points alone are written: the {len(array)} vertices of a mesh, without its {len(faces)} faces"
+        warnings.warn(f"{path}: {sentence}", ReadingWarning, stacklevel=2)
     if _srrf.write(path, cloud, single):
         sentence = "single precision would move points, so it has double precision"
-        warnings.warn(f"{os.fspath(path)}: {sentence}", ReadingWarning, stacklevel=2)
+        warnings.warn(f"{path}: {sentence}", ReadingWarning, stacklevel=2)
 
 
 def unit_factor(unit: Unit, to: Unit) -> float:
@@ -194,5 +200,4 @@ def _reading(
 
 
 def _from_1(name: str, number: int) -> None:
-    if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 1:
-        raise OptionError(f"{name} is {number!r}: expected a whole number from 1")
+    whole(name, number, 1, 2**63 - 1)

@@ -10,12 +10,16 @@ from numpy.typing import NDArray
 
 from . import _srrf
 from ._arrays import Cloud, cloud_of, pose_of
-from ._errors import InputTypeError, OptionError
+from ._errors import OptionError
+from ._options import real, text, truth, whole
 from ._result import Result
 
 Method = Literal["auto", "srrf", "fpfh-ransac", "icp", "given"]
 Rotation = Literal["so3", "180", "45", 180, 45]
 Scale = Union[float, Literal["auto"], None]
+
+#: Most threads that can be asked for.
+MOST_THREADS = 4096
 
 
 class Options(TypedDict):
@@ -74,7 +78,7 @@ class Registrar:
         scale: Scale = None,
         num_threads: int | None = None,
     ) -> None:
-        self._options = _options(
+        self._options = checked_options(
             method=method,
             rotation=rotation,
             refine=refine,
@@ -111,7 +115,7 @@ class Registrar:
         source: Cloud,
         target: Cloud | Target,
         *,
-        initial: NDArray[Any] | None = None,
+        initial: NDArray[Any] | Result | None = None,
         names: tuple[str | None, str | None] = (None, None),
     ) -> Result:
         """Finds the pose that lays ``source`` on ``target``: ``target ~ R source + t``.
@@ -164,14 +168,16 @@ class Target:
         return f"<srrf.Target {self._inner.cloud.name}: {len(self)} points>"
 
     def __reduce__(self) -> tuple[Any, tuple[Registrar, NDArray[np.float64], str]]:
-        return _target, (self._registrar, self.points, self._inner.cloud.name)
+        cloud = self._inner.cloud
+        left_out = np.full((cloud.dropped, 3), np.nan)  # so that they are counted again
+        return _target, (self._registrar, np.concatenate([self.points, left_out]), cloud.name)
 
 
 def register(
     source: Cloud,
     target: Cloud,
     *,
-    initial: NDArray[Any] | None = None,
+    initial: NDArray[Any] | Result | None = None,
     method: Method = "auto",
     rotation: Rotation = "so3",
     refine: bool = True,
@@ -190,7 +196,7 @@ def register(
     Args:
         source: the cloud to move: a file, points of shape (N, >= 3) in any unit, an Open3D cloud, a trimesh mesh, a tensor.
         target: the cloud to lay it on, in the same unit.
-        initial: a first guess of the pose, shape (4, 4).
+        initial: a first guess of the pose, shape (4, 4), or a :class:`Result`.
         method: as for :class:`Registrar`, and so are all that follow.
 
     Returns:
@@ -201,7 +207,7 @@ def register(
         OptionError: for options that make no sense.
         NoPoseError: where no pose is found.
     """
-    options = _options(
+    options = checked_options(
         method=method,
         rotation=rotation,
         refine=refine,
@@ -216,41 +222,40 @@ def register(
     return _registrar(options).register(source, target, initial=initial)
 
 
-def _options(
+def checked_options(
     *,
-    method: str,
-    rotation: str | int,
-    refine: bool,
-    weights: str | os.PathLike[str] | None,
-    device: str,
-    seed: int,
-    abstain_below: float,
-    vertices: bool,
-    scale: float | str | None,
-    num_threads: int | None,
+    method: str = "auto",
+    rotation: str | int = "so3",
+    refine: bool = True,
+    weights: str | os.PathLike[str] | None = None,
+    device: str = "flex",
+    seed: int = 0,
+    abstain_below: float = 0.5,
+    vertices: bool = False,
+    scale: float | str | None = None,
+    num_threads: int | None = None,
 ) -> Options:
     if scale is not None and not isinstance(scale, str):
         if isinstance(scale, bool) or not isinstance(scale, (int, float, np.integer, np.floating)):
             raise OptionError(f'scale is {scale!r}: expected a number above 0, "auto", or None')
         scale = float(scale)
-    if not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**64:
-        raise OptionError(f"seed is {seed!r}: expected a whole number from 0 to 2**64 - 1")
-    if num_threads is not None and not isinstance(num_threads, (int, np.integer)):
-        raise OptionError(f"num_threads is {num_threads!r}: expected a whole number, or None for all cores")
-    for name, value in (("method", method), ("device", device)):
-        if not isinstance(value, str):
-            raise InputTypeError(f"{name} is {value!r}: expected text")
+    if not isinstance(rotation, str) and rotation in (45, 180):
+        rotation = int(rotation)
+    try:
+        named = None if weights is None else os.fsdecode(weights)
+    except TypeError:
+        raise OptionError(f"weights is {weights!r}: expected a file, a name, or None") from None
     return Options(
-        method=method,
+        method=text("method", method),
         rotation=str(rotation),
-        refine=bool(refine),
-        weights=None if weights is None else os.fspath(weights),
-        device=device,
-        seed=int(seed),
-        abstain_below=float(abstain_below),
-        vertices=bool(vertices),
+        refine=truth("refine", refine),
+        weights=named,
+        device=text("device", device),
+        seed=whole("seed", seed, 0, 2**64 - 1),
+        abstain_below=real("abstain_below", abstain_below),
+        vertices=truth("vertices", vertices),
         scale=scale,
-        num_threads=None if num_threads is None else int(num_threads),
+        num_threads=None if num_threads is None else whole("num_threads", num_threads, 1, MOST_THREADS),
     )
 
 

@@ -63,11 +63,14 @@ def score(
     Raises:
         InputError: for lists of different lengths, and matrices that are no rigid motion.
     """
+    for name, given in (("poses", poses), ("truth", truth)):
+        if isinstance(given, Result) or (isinstance(given, np.ndarray) and given.ndim == 2):
+            raise InputError(f"{name}: one pose, where one for each pair is expected; pass [{name}]")
     found = [_matrix(pose, f"poses[{i}]") for i, pose in enumerate(poses)]
     true = [pose_of(pose, f"truth[{i}]") for i, pose in enumerate(truth)]
     held = None
     if clouds is not None:
-        held = [(cloud_of(s, None, f"clouds[{i}][0]"), cloud_of(t, None, f"clouds[{i}][1]")) for i, (s, t) in enumerate(clouds)]
+        held = [_both(pair, f"clouds[{i}]") for i, pair in enumerate(clouds)]
     for name, length in (("truth", len(true)), ("clouds", len(found) if held is None else len(held))):
         if length != len(found):
             raise InputError(f"{len(found)} poses, but {length} in {name}; pass one of each for every pair")
@@ -77,6 +80,12 @@ def score(
     known["rotation_deg"] = np.array([error["rotation_deg"] for error in answer["errors"]])
     known["translation"] = np.array([error["translation_norm"] for error in answer["errors"]])
     return Scores(**known)
+
+
+def _both(pair: Any, name: str) -> tuple[_srrf.Cloud, _srrf.Cloud]:
+    if isinstance(pair, (str, bytes)) or not hasattr(pair, "__len__") or len(pair) != 2:
+        raise InputError(f"{name}: expected the source and the target of a pair; pass [(source, target), ...]")
+    return cloud_of(pair[0], None, f"{name}[0]"), cloud_of(pair[1], None, f"{name}[1]")
 
 
 def _matrix(pose: Any, name: str) -> NDArray[np.float64] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,9 +13,16 @@ from numpy.typing import NDArray
 
 from . import _srrf
 from ._arrays import Cloud, cloud_of
-from ._errors import OptionError
+from ._errors import InputTypeError, OptionError
+from ._register import MOST_THREADS
+from ._options import real, several, text, truth, whole
 
 Reading = Literal["paper", "modelnet40_c"]
+
+_SEEDS = 2**64 - 1
+#: More would not fit into the memory of most machines.
+_MOST_SHAPES = 1_000_000
+_MOST_POINTS = 10_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +43,7 @@ def corrupt(
     seed: int = 0,
     *,
     reading: Reading = "paper",
+    vertices: bool = False,
     return_origin: Literal[False] = False,
 ) -> NDArray[np.float64]: ...
 
@@ -47,6 +56,7 @@ def corrupt(
     seed: int = 0,
     *,
     reading: Reading = "paper",
+    vertices: bool = False,
     return_origin: Literal[True],
 ) -> Corrupted: ...
 
@@ -58,11 +68,13 @@ def corrupt(
     seed: int = 0,
     *,
     reading: Reading = "paper",
+    vertices: bool = False,
     return_origin: bool = False,
 ) -> NDArray[np.float64] | Corrupted:
     """Corrupts a cloud in one of twelve ways: the bytes that ``srrf corrupt`` writes.
 
     The cloud is brought to the unit sphere, corrupted there, and mapped back. Points with NaN or infinity are left out before.
+    A mesh is corrupted as points drawn from its surface, by the seed.
 
     Args:
         points: a file, or points of shape (N, >= 3).
@@ -70,6 +82,7 @@ def corrupt(
         severity: how strong, 1 to 5.
         seed: seed of the draws. The same seed gives the same bytes.
         reading: the paper's text, or the code of ModelNet40-C, where they differ.
+        vertices: whether the vertices of a mesh are its cloud.
         return_origin: whether to say where each point comes from.
 
     Returns:
@@ -78,9 +91,16 @@ def corrupt(
 
     Raises:
         OptionError: for a kind or severity that does not exist.
-        InputError: for a cloud that is too small, and other shapes.
+        InputError: for a cloud that is too small, a mesh without a surface, and other shapes.
     """
-    moved, origin = _srrf.corrupt(cloud_of(points, None, "points"), kind, _whole("severity", severity), _seed(seed), reading)
+    moved, origin = _srrf.corrupt(
+        cloud_of(points, None, "points"),
+        text("kind", kind),
+        _severity(severity),
+        whole("seed", seed, 0, _SEEDS),
+        text("reading", reading),
+        truth("vertices", vertices),
+    )
     return Corrupted(moved, origin) if return_origin else moved
 
 
@@ -164,35 +184,48 @@ class Pairs(Sequence[Pair]):
     def __getitem__(self, index: int | slice) -> Pair | list[Pair]:
         if isinstance(index, slice):
             return self.take(range(*index.indices(len(self))))
-        return self.take([index])[0]
+        try:
+            place = operator.index(index)
+        except TypeError:
+            raise TypeError(f"{index!r} is no number of a pair; pass a whole number or a slice") from None
+        return self.take([place])[0]
 
     def __iter__(self) -> Iterator[Pair]:
         for begin in range(0, len(self), _TOGETHER):
             yield from self[begin : begin + _TOGETHER]
 
     def take(self, indices: Sequence[int]) -> list[Pair]:
-        """The pairs of these indices, made in parallel."""
-        return [Pair(**made) for made in self._inner.pairs([self._place(int(index)) for index in indices])]
+        """The pairs of these indices, made in parallel. A mask of truth values chooses as in NumPy."""
+        return [Pair(**made) for made in self._inner.pairs(self._places(indices))]
 
     def arrays(self, indices: Sequence[int] | slice | None = None) -> PairArrays:
         """Stacks the pairs of these indices (all of them without), made in parallel.
 
         Raises:
-            InputError: where clouds differ in size, as crops do; :meth:`take` them then.
+            InputError: where clouds differ in size, as crops do; :meth:`take` them then. Also for more pairs than half of the
+                machine's memory holds.
         """
-        if indices is None:
-            chosen: Sequence[int] = range(len(self))
-        elif isinstance(indices, slice):
-            chosen = range(*indices.indices(len(self)))
-        else:
-            chosen = indices
-        return PairArrays(**self._inner.arrays([self._place(int(index)) for index in chosen]))
+        return PairArrays(**self._inner.arrays(self._places(slice(None) if indices is None else indices)))
 
-    def _place(self, index: int) -> int:
+    def _places(self, indices: Sequence[int] | slice) -> Sequence[int]:
         size = len(self)
-        if not -size <= index < size:
-            raise IndexError(f"pair {index} of {size}")
-        return index % size
+        if isinstance(indices, slice):
+            return range(*indices.indices(size))
+        if isinstance(indices, range):
+            chosen = np.arange(indices.start, indices.stop, indices.step)
+        else:
+            chosen = np.asarray(indices)
+        if chosen.dtype == bool:
+            if chosen.shape != (size,):
+                raise IndexError(f"a mask of shape {chosen.shape} for {size} pairs")
+            chosen = np.flatnonzero(chosen)
+        if chosen.ndim != 1 or (chosen.size and chosen.dtype.kind not in "iu"):
+            raise InputTypeError(f"indices of shape {chosen.shape} and type {chosen.dtype}; pass a list of whole numbers, or a slice")
+        bad = chosen[(chosen < -size) | (chosen >= size)] if chosen.size else chosen
+        if bad.size:
+            raise IndexError(f"pair {bad[0]} of {size}")
+        places: list[int] = [int(index) % size for index in chosen]
+        return places
 
     def __repr__(self) -> str:
         return f"<srrf.Pairs {len(self)}: {self.description}>"
@@ -248,44 +281,34 @@ def pairs(
         OptionError: for options that make no sense.
         FileError: for data that cannot be read.
     """
-    for name, value in (("shapes", shapes), ("points", points)):
-        if _whole(name, value) < 1:
-            raise OptionError(f"{name} is {value}: expected a whole number from 1")
-    angles = None if rotation == "so3" else float(rotation)
+    if isinstance(rotation, str) and rotation != "so3":
+        raise OptionError(f'rotation is {rotation!r}: expected degrees, or "so3"')
+    kinds = _srrf.CORRUPTIONS if corruptions is None else several("corruptions", corruptions, '["cutout", "gaussian"]')
     return Pairs(
-        shapes=int(shapes),
-        corruptions=_srrf.CORRUPTIONS if corruptions is None else list(corruptions),
-        severities=[_whole("severity", severity) for severity in severities],
-        clean=bool(clean),
-        data=None if data is None else os.fspath(data),
-        split=split,
-        seed=_seed(seed),
-        points=int(points),
-        rotation_deg=angles,
-        translation=float(translation),
-        corrupt=corrupt,
-        sampling=sampling,
-        normalize=normalize,
-        reading=reading,
-        crop=None if crop is None else float(crop),
-        dcp_poses=bool(dcp_poses),
-        spread=bool(spread),
-        num_threads=num_threads,
+        shapes=whole("shapes", shapes, 1, _MOST_SHAPES),
+        corruptions=[text("corruptions", kind) for kind in kinds],
+        severities=[_severity(severity) for severity in several("severities", severities, "[1, 3, 5]")],
+        clean=truth("clean", clean),
+        data=None if data is None else os.fsdecode(data),
+        split=text("split", split),
+        seed=whole("seed", seed, 0, _SEEDS),
+        points=whole("points", points, 1, _MOST_POINTS),
+        rotation_deg=None if isinstance(rotation, str) else real("rotation", rotation),
+        translation=real("translation", translation),
+        corrupt=text("corrupt", corrupt),
+        sampling=text("sampling", sampling),
+        normalize=text("normalize", normalize),
+        reading=text("reading", reading),
+        crop=None if crop is None else real("crop", crop),
+        dcp_poses=truth("dcp_poses", dcp_poses),
+        spread=truth("spread", spread),
+        num_threads=None if num_threads is None else whole("num_threads", num_threads, 1, MOST_THREADS),
     )
+
+
+def _severity(number: Any) -> int:
+    return whole("severity", number, -(2**63), 2**63 - 1)  # the library says which there are
 
 
 def _pairs(options: dict[str, Any]) -> Pairs:
     return Pairs(**options)
-
-
-def _whole(name: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
-        raise OptionError(f"{name} is {value!r}: expected a whole number")
-    return int(value)
-
-
-def _seed(seed: Any) -> int:
-    number = _whole("seed", seed)
-    if not 0 <= number < 2**64:
-        raise OptionError(f"seed is {number}: expected a whole number from 0 to 2**64 - 1")
-    return number

@@ -15,14 +15,18 @@ Columns in and out are those of ``srrf batch``.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
+from collections import Counter
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from .rows import SCHEMA, PairRegistrar, check_names
+from ._errors import InputError, OptionError, SrrfError
+from ._register import Registrar
+from .rows import SCHEMA, PairRegistrar, check_names, described
 
 __all__ = ["SCHEMA", "RegisterPairs", "main"]
 
@@ -67,7 +71,7 @@ def _plain(value: Any) -> Any:
 def main(arguments: list[str] | None = None) -> int:
     """The command ``python -m srrf.ray``."""
     parser = argparse.ArgumentParser(prog="python -m srrf.ray", description="Registers the pairs of a list by Ray.")
-    parser.add_argument("pairs", help="the list: Parquet or CSV, with the columns of `srrf batch`")
+    parser.add_argument("pairs", help="the list: Parquet, CSV or JSON lines, with the columns of `srrf batch`")
     parser.add_argument("out", help="a folder for the results, Parquet; pairs that are in it are not done again")
     parser.add_argument("--address", help="of a cluster; without it one is started on this machine")
     parser.add_argument("--concurrency", type=int, help="actors; all CPUs of the cluster without it")
@@ -75,57 +79,102 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--method", default="auto")
     parser.add_argument("--rotation", default="so3")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--retry-failed", action="store_true", help="do pairs again that have no pose")
     args = parser.parse_args(arguments)
-
-    import pyarrow.csv
-    import pyarrow.parquet
+    options: dict[str, Any] = {"method": args.method, "rotation": args.rotation, "seed": args.seed}
+    out = args.out if "://" in args.out else os.path.abspath(args.out)
+    try:
+        pairs = _list(args.pairs)
+        names = [_known(row) for row in pairs.to_pylist()]
+        twice = [name for name, count in Counter(names).items() if count > 1]
+        if twice:
+            raise InputError(f"{args.pairs}: the pair `{twice[0]}` stands in it twice; tell the two apart by an `id`")
+        if args.batch_size < 1 or (args.concurrency is not None and args.concurrency < 1):
+            raise OptionError("--batch-size and --concurrency are whole numbers from 1")
+        done = _done(out, described(Registrar(**options, num_threads=1).options), args.retry_failed)
+    except (SrrfError, OSError, pa.ArrowException) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    places = [place for place, name in enumerate(names) if name not in done]
+    print(f"{len(names)} pairs, {len(names) - len(places)} done already", file=sys.stderr)
+    if not places:
+        return 0
     import ray
 
-    read = pyarrow.csv.read_csv if args.pairs.endswith(".csv") else pyarrow.parquet.read_table
-    pairs = read(args.pairs)
-    missing = [name for name in ("source", "target") if name not in pairs.column_names]
-    if missing:
-        print(f"error: {args.pairs} has no column {missing}; it has {pairs.column_names}", file=sys.stderr)
-        return 2
-    done = _done(args.out)
-    rows = pairs.to_pylist()
-    todo = pairs.take([i for i, row in enumerate(rows) if _known(row) not in done])
-    print(f"{len(rows)} pairs, {len(rows) - todo.num_rows} done already", file=sys.stderr)
-    if todo.num_rows == 0:
-        return 0
+    todo = pairs.take(pa.array(places, pa.int64()))
     ray.init(address=args.address, ignore_reinit_error=True, log_to_driver=False)
     count = args.concurrency or max(1, int(ray.cluster_resources().get("CPU", 1)))
-    size = max(1, args.batch_size)
+    size = args.batch_size
     blocks = [todo.slice(begin, size) for begin in range(0, todo.num_rows, size)]
-    folder = os.path.dirname(os.path.abspath(args.pairs))
-    options = {"method": args.method, "rotation": args.rotation, "seed": args.seed}
     answers = ray.data.from_arrow(blocks).map_batches(
         RegisterPairs,
-        fn_constructor_args=(folder,),
+        fn_constructor_args=(os.path.dirname(os.path.abspath(args.pairs)),),
         fn_constructor_kwargs=options,
         batch_size=size,
         batch_format="pyarrow",
         compute=ray.data.ActorPoolStrategy(size=count),
         num_cpus=_ACTOR_CPUS,
     )
-    answers.write_parquet(args.out, ray_remote_args={"num_cpus": 1 - _ACTOR_CPUS})
+    answers.write_parquet(out, ray_remote_args={"num_cpus": 1 - _ACTOR_CPUS})
     return 0
+
+
+def _list(path: str) -> pa.Table:
+    """The list of pairs. In text everything is text, as for ``srrf batch``: an id `007` stays what it is."""
+    ending = os.path.splitext(path)[1].lower()
+    if ending == ".csv":
+        import pyarrow.csv as csv
+
+        with csv.open_csv(path) as reader:
+            names = reader.schema.names
+        texts = csv.ConvertOptions(column_types={name: pa.string() for name in names})
+        pairs = csv.read_csv(path, convert_options=texts)
+    elif ending in (".jsonl", ".ndjson"):
+        import pyarrow.json
+
+        pairs = pyarrow.json.read_json(path)
+    else:
+        import pyarrow.parquet
+
+        pairs = pyarrow.parquet.read_table(path)
+    missing = [name for name in ("source", "target") if name not in pairs.column_names]
+    if missing:
+        raise InputError(f"{path} has no column {missing}; it has {pairs.column_names}")
+    check_names(pairs.column_names)
+    return pairs
 
 
 def _known(row: dict[str, Any]) -> str:
     """What a pair is known by, as in ``srrf batch``."""
     if row.get("id") not in (None, ""):
         return str(row["id"])
+    if not isinstance(row["source"], str) or not isinstance(row["target"], str):
+        raise InputError("clouds without paths need a column `id`")
     files = f"{row['source']} -> {row['target']}"
     return files if not row.get("initial") else f"{files} ({row['initial']})"
 
 
-def _done(folder: str) -> set[str]:
+def _done(folder: str, options: dict[str, Any], retry: bool) -> set[str]:
+    """The pairs that have an answer by these options; with `retry` answers without a pose are taken out of the folder."""
     import pyarrow.dataset
+    import pyarrow.parquet
 
-    if not os.path.isdir(folder) or not any(name.endswith(".parquet") for name in os.listdir(folder)):
+    if "://" not in folder and not os.path.exists(folder):
         return set()
-    return set(pyarrow.dataset.dataset(folder, format="parquet").to_table(columns=["id"])["id"].to_pylist())
+    found = pyarrow.dataset.dataset(folder, format="parquet", exclude_invalid_files=True)
+    done: set[str] = set()
+    for fragment in found.get_fragments():
+        table = fragment.to_table()
+        for text in table["answer"].to_pylist()[:1]:
+            other = json.loads(text).get("options")
+            if other != options:
+                raise InputError(f"{folder} holds answers by other options, {other}; name another folder")
+        if retry and table["error"].null_count < table.num_rows:
+            table = table.filter(table["error"].is_null())
+            pyarrow.parquet.write_table(table, f"{fragment.path}.new")
+            os.replace(f"{fragment.path}.new", fragment.path)
+        done.update(table["id"].to_pylist())
+    return done
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import pyarrow as pa
 from . import _srrf
 from ._arrays import Cloud
 from ._errors import InputError, SrrfError
-from ._register import Registrar, Target
+from ._register import Options, Registrar, Target
 
 _EVIDENCE = ("spacing", "inlier_threshold", "inliers", "fitness", "inlier_rmse", "overlap_target")
 
@@ -59,16 +59,7 @@ class PairRegistrar:
         self._folder = None if folder is None else os.fspath(folder)
         self._registrar = Registrar(**options)
         self._last: tuple[str, Cloud | Target] | None = None
-        options_of = self._registrar.options
-        self._described: dict[str, Any] = {
-            "method": options_of["method"],
-            "rotation": "45" if options_of["rotation"] == "45" else "180",
-            "refine": options_of["refine"],
-            "weights": options_of["weights"],
-            "seed": options_of["seed"],
-        }
-        if options_of["scale"] is not None:
-            self._described["scale"] = options_of["scale"]
+        self._described = described(self._registrar.options)
 
     def row(self, pair: Mapping[str, Any]) -> dict[str, Any]:
         """The answer for one pair, by the names of :data:`SCHEMA`."""
@@ -157,6 +148,22 @@ class PairRegistrar:
             path = value if self._folder is None else os.path.join(self._folder, value)
             return np.loadtxt(path)
         return np.asarray(value, dtype=np.float64).reshape(4, 4)
+
+
+def described(options: Options) -> dict[str, Any]:
+    """What answers depend on, as every row of ``srrf batch`` says it."""
+    said: dict[str, Any] = {
+        "method": options["method"],
+        "rotation": "45" if options["rotation"] == "45" else "180",
+        "refine": options["refine"],
+        "weights": options["weights"],
+        "seed": options["seed"],
+    }
+    if options["scale"] is not None:
+        said["scale"] = options["scale"]
+    if options["vertices"]:
+        said["vertices"] = True
+    return said
 
 
 def check_names(columns: list[str]) -> None:

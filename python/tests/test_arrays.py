@@ -118,7 +118,7 @@ def test_real_libraries_are_taken(cloud):
     trimesh = pytest.importorskip("trimesh")
     assert np.array_equal(srrf.corrupt(trimesh.PointCloud(cloud), "uniform", 1, 2), expected)
     mesh = trimesh.Trimesh(vertices=cloud, faces=[[0, 1, 2]], process=False)
-    assert np.array_equal(srrf.corrupt(mesh, "uniform", 1, 2), expected)
+    assert np.array_equal(srrf.corrupt(mesh, "uniform", 1, 2, vertices=True), expected)
 
 
 def test_open3d_is_taken(cloud):

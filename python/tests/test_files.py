@@ -1,5 +1,6 @@
 """Reading and writing with options, meshes as surfaces, units."""
 
+import os
 import subprocess
 import sys
 import warnings
@@ -187,3 +188,67 @@ def test_other_units_are_asked_for_and_brought_together(truth):
     for bad in (0.0, -1.0, float("nan"), "twice", True):
         with pytest.raises(srrf.OptionError, match="scale is"):
             srrf.register(PART[:500], scan, scale=bad)
+
+
+def test_every_format_there_and_back_by_every_kind_of_path(cloud, tmp_path):
+    exact = {"ply", "pcd", "npy", "npz", "off", "obj", "mcap", "parquet", "pq", "vtk", "vtp", "ptx", "pts", "xyz", "txt", "csv", "e57"}
+    single = {"bin", "glb", "gltf", "kitti"}
+    seen = set()
+    for extension in srrf.FORMATS:
+        path = tmp_path / f"a.{extension}"
+        try:
+            srrf.write(str(path), cloud)
+        except srrf.FileError as error:
+            assert extension in str(error), error
+            continue
+        seen.add(extension)
+        found = srrf.read(path)
+        for other in (str(path), os.fsencode(path)):
+            assert srrf.read(other).tobytes() == found.tobytes()
+        assert np.abs(found - cloud).max() < (2e-3 if extension in ("las", "laz") else 1e-6), extension
+        if extension in exact:
+            assert found.tobytes() == cloud.tobytes(), extension
+        if extension in single:
+            assert np.array_equal(found, cloud.astype(np.float32)), extension
+        assert srrf.scans(str(path))[0].points == len(cloud), extension
+    assert {"ply", "pcd", "npy", "las", "e57", "parquet"} <= seen
+
+
+def test_what_is_no_file_is_said(tmp_path, cloud):
+    (tmp_path / "empty.ply").write_bytes(b"")
+    for path, error, word in [
+        (tmp_path, srrf.FileError, "irectory"),
+        ("", srrf.MissingFileError, ""),
+        (tmp_path / "empty.ply", srrf.FileError, "empty.ply"),
+        (tmp_path / "no" / "a.ply", srrf.MissingFileError, "a.ply"),
+    ]:
+        with pytest.raises(error, match=word):
+            srrf.read(path)
+        with pytest.raises(error, match=word):
+            srrf.register(path, cloud)
+    for path, word in [(tmp_path / "a", "extension"), (tmp_path / "no" / "a.ply", "no"), (tmp_path, "")]:
+        with pytest.raises(srrf.FileError, match=word):
+            srrf.write(path, cloud)
+    for bad in (None, 3):
+        with pytest.raises(TypeError):
+            srrf.read(bad)
+    assert [p.name for p in tmp_path.iterdir()] == ["empty.ply"], "nothing is left behind"
+
+
+def test_a_mesh_is_corrupted_as_the_program_does(tmp_path):
+    write_off(tmp_path / "part.off")
+    corners, faces = vertices_and_faces()
+    for switch, vertices in ([], False), (["--vertices"], True):
+        command = [sys.executable, "-m", "srrf", "corrupt", "part.off", "-o", "bad.npy", "-c", "gaussian", "--seed", "5", *switch]
+        subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+        expected = np.load(tmp_path / "bad.npy")
+        assert len(expected) == (16 if vertices else 20000)
+        for mesh in (tmp_path / "part.off", Mesh(corners, faces)):
+            assert srrf.corrupt(mesh, "gaussian", seed=5, vertices=vertices).tobytes() == expected.tobytes()
+
+
+def test_a_mesh_is_written_as_points_and_that_is_said(tmp_path):
+    corners, faces = vertices_and_faces()
+    with pytest.warns(srrf.ReadingWarning, match="16 vertices of a mesh, without its 24 faces"):
+        srrf.write(tmp_path / "a.ply", Mesh(corners, faces))
+    assert np.array_equal(srrf.read(tmp_path / "a.ply"), corners)

@@ -1,7 +1,7 @@
 //! Meshes are surfaces: what has faces is drawn as a cloud.
 
 use clap::Args;
-use srrf_cloud::{FEWEST_SCANNED, MeshError, TriangleMesh};
+use srrf_cloud::{FEWEST_SCANNED, MeshError, PointCloud, TriangleMesh};
 
 use crate::failure::Failure;
 use crate::files::Input;
@@ -88,6 +88,13 @@ pub fn mesh(input: &Input, vertices: bool) -> Result<Option<TriangleMesh>, Failu
     })
 }
 
+/// Points of the surface of a mesh that stands alone; none where its vertices lie dense enough.
+pub fn points_alone(mesh: &TriangleMesh, vertices: usize, seed: u64) -> Option<PointCloud> {
+    let wanted = mesh.vertex_spacing();
+    let dense = vertices >= FEWEST_SCANNED && mesh.is_as_fine_as(wanted);
+    (!dense).then(|| mesh.sample(mesh.samples_for(wanted), seed))
+}
+
 impl SurfaceFlag {
     /// Replaces the cloud of a mesh by points of its surface, as dense as two such meshes get that are registered with each
     /// other. None for a cloud.
@@ -105,13 +112,13 @@ impl SurfaceFlag {
             return Ok(Some(DrawnAlone { vertices, faces, left_out, how: DrawnHow::Asked }));
         };
         let left_out = mesh.left_out() + input.lost_faces;
-        let wanted = mesh.vertex_spacing();
-        let how = if vertices.len() >= FEWEST_SCANNED && mesh.is_as_fine_as(wanted) {
-            DrawnHow::Dense
-        } else {
-            let points = mesh.samples_for(wanted);
-            input.cloud = mesh.sample(points, seed);
-            DrawnHow::Points(input.cloud.len(), mesh.spacing_of(points))
+        let how = match points_alone(&mesh, vertices.len(), seed) {
+            None => DrawnHow::Dense,
+            Some(points) => {
+                let spacing = mesh.spacing_of(points.len());
+                input.cloud = points;
+                DrawnHow::Points(input.cloud.len(), spacing)
+            }
         };
         Ok(Some(DrawnAlone { vertices, faces, left_out, how }))
     }

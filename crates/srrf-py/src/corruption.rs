@@ -7,7 +7,7 @@ use srrf_corrupt::{CorruptionKind, Severity, UnknownCorruption, Variants};
 
 use crate::cloud::{Cloud, checked, origins, to_array};
 use crate::refusal::{Fault, Refusal};
-use crate::work;
+use crate::{surface, work};
 
 /// The names of the corruptions, in the paper's order.
 pub fn names() -> Vec<&'static str> {
@@ -51,7 +51,7 @@ pub fn variants(reading: &str) -> Result<Variants, Refusal> {
 /// The corrupted points and where each comes from.
 type CorruptedArrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i64>>);
 
-/// Corrupts a cloud: brought to the unit sphere, corrupted there, mapped back.
+/// Corrupts a cloud: brought to the unit sphere, corrupted there, mapped back. Of a mesh, its vertices or its surface.
 #[pyfunction(name = "corrupt")]
 pub fn corrupt<'py>(
     py: Python<'py>,
@@ -60,10 +60,12 @@ pub fn corrupt<'py>(
     number: i64,
     seed: u64,
     reading: &str,
+    vertices: bool,
 ) -> PyResult<CorruptedArrays<'py>> {
     let (kind, severity, variants) = (kind(name)?, severity(number)?, variants(reading)?);
     let cloud = cloud.clone();
     let (points, origin) = work::run(py, 1, move |_| {
+        let cloud = surface::alone(&cloud, vertices, seed)?;
         let (unit, frame) = cloud.points.to_unit_sphere();
         let corruption = srrf_corrupt::corruption(kind, &variants);
         let corrupted = corruption.apply(unit.points(), severity, &mut ChaCha8Rng::seed_from_u64(seed))?;

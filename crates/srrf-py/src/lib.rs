@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use refusal::{Fault, Refusal};
 
 mod align;
+mod bases;
 mod cloud;
 mod corruption;
 mod files;

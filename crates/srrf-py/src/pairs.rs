@@ -8,11 +8,13 @@ use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
+use srrf_cloud::io::ReadOptions;
 use srrf_corrupt::datasets::{self, ShapeSource, Split};
 use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::{Pair, PairConfig, RotationRange};
 use srrf_eval::{CLEAN, PairSource, Protocol, SynthesizedPairs, data};
 
+use crate::bases::Remembered;
 use crate::cloud::{origins, to_array};
 use crate::corruption;
 use crate::pose;
@@ -23,8 +25,10 @@ use crate::work;
 #[pyclass(frozen, module = "srrf._srrf")]
 pub struct Pairs {
     inner: Arc<SynthesizedPairs>,
-    /// Group and item of each pair.
-    places: Vec<(usize, usize)>,
+    /// Where each group ends in the list of all pairs.
+    ends: Vec<usize>,
+    /// Points of each cloud.
+    points: usize,
     threads: usize,
 }
 
@@ -89,15 +93,19 @@ impl Pairs {
         let split = split.to_owned();
         let inner = work::run(py, threads, move |_| {
             let source = open(data, &split, shapes, seed)?;
-            Ok(SynthesizedPairs::new(source, protocol)?)
+            Ok(SynthesizedPairs::new(Box::new(Remembered::new(source)), protocol)?)
         })?;
-        let items = |(group, of): (usize, &srrf_eval::Group)| (0..of.pairs).map(move |item| (group, item));
-        let places = inner.groups().iter().enumerate().flat_map(items).collect();
-        Ok(Self { inner: Arc::new(inner), places, threads })
+        let mut end = 0;
+        let ends = inner.groups().iter().map(|group| {
+            end += group.pairs;
+            end
+        });
+        let ends = ends.collect();
+        Ok(Self { inner: Arc::new(inner), ends, points, threads })
     }
 
     fn __len__(&self) -> usize {
-        self.places.len()
+        self.ends.last().copied().unwrap_or(0)
     }
 
     /// One line on the data and the protocol.
@@ -107,10 +115,11 @@ impl Pairs {
 
     /// The pairs of these indices as dictionaries of arrays: made in parallel.
     fn pairs<'py>(&self, py: Python<'py>, indices: Vec<usize>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        self.check_memory(indices.len())?;
         let threads = if indices.len() == 1 { 1 } else { self.threads };
         let made = self.make(py, threads, &indices, Ok)?;
         let dict = |(made, index): (Pair, usize)| {
-            let dict = self.described(py, &made, self.places[index].0)?;
+            let dict = self.described(py, &made, self.place(index).0)?;
             dict.set_item("target_from_source", pose::matrix(py, &made.target_from_source)?)?;
             for (name, origin) in
                 [("source_origin", &made.source_origin), ("target_origin", &made.target_origin)]
@@ -126,8 +135,10 @@ impl Pairs {
 
     /// The pairs of these indices, stacked: made in parallel.
     fn arrays<'py>(&self, py: Python<'py>, indices: Vec<usize>) -> PyResult<Bound<'py, PyDict>> {
+        // While they are stacked they are there twice.
+        self.check_memory(2 * indices.len())?;
         let made = self.make(py, self.threads, &indices, |pairs| Stacked::new(&pairs))?;
-        let chosen: Vec<(usize, usize)> = indices.iter().map(|i| self.places[*i]).collect();
+        let chosen: Vec<(usize, usize)> = indices.iter().map(|i| self.place(*i)).collect();
         let dict = PyDict::new(py);
         let n = chosen.len();
         let corruption: Vec<&str> =
@@ -155,6 +166,28 @@ impl Pairs {
 }
 
 impl Pairs {
+    /// Group and item of a pair.
+    fn place(&self, index: usize) -> (usize, usize) {
+        let group = self.ends.partition_point(|end| *end <= index);
+        let before = group.checked_sub(1).map_or(0, |before| self.ends[before]);
+        (group, index - before)
+    }
+
+    /// Refuses what the machine does not hold.
+    fn check_memory(&self, pairs: usize) -> Result<(), Refusal> {
+        let pair = 2 * (size_of::<[f64; 3]>() + size_of::<i64>()) * self.points;
+        let (bytes, most) = ((pair as u64).saturating_mul(pairs as u64), ReadOptions::default().memory());
+        if bytes <= most {
+            return Ok(());
+        }
+        let message = format!(
+            "so many pairs would take {:.1} GB, more than half of this machine's memory; take fewer at a time, such as \
+             arrays(slice(0, 64))",
+            bytes as f64 / 1e9
+        );
+        Err(Refusal::new(Fault::Input, message))
+    }
+
     /// What becomes of the pairs of these indices, which are made in parallel.
     fn make<T: Send + 'static>(
         &self,
@@ -164,7 +197,7 @@ impl Pairs {
         then: fn(Vec<Pair>) -> Result<T, Refusal>,
     ) -> PyResult<T> {
         let inner = Arc::clone(&self.inner);
-        let chosen: Vec<(usize, usize)> = indices.iter().map(|i| self.places[*i]).collect();
+        let chosen: Vec<(usize, usize)> = indices.iter().map(|i| self.place(*i)).collect();
         work::run(py, threads, move |stop| {
             let make = |(group, item): &(usize, usize)| {
                 if stop.load(Ordering::Relaxed) {
@@ -229,7 +262,7 @@ impl Stacked {
             ));
         }
         let all = |of: fn(&Pair) -> &[[f64; 3]]| {
-            pairs.iter().flat_map(|pair| of(pair).as_flattened()).copied().collect()
+            pairs.iter().map(|pair| of(pair).as_flattened()).collect::<Vec<_>>().concat()
         };
         let origin = |of: fn(&Pair) -> &Option<Vec<Option<u32>>>| -> Option<Vec<i64>> {
             let rows: Option<Vec<_>> = pairs.iter().map(|pair| of(pair).as_deref()).collect();

@@ -1,6 +1,7 @@
 //! Meshes are surfaces: what has faces is drawn as densely as the cloud that it is registered with, as the program does.
 
 use srrf::{DrawnSurface, MeshedCloud, draw_pair};
+use srrf_args::surface::points_alone;
 use srrf_cloud::{PointCloud, TriangleMesh};
 
 use crate::cloud::Cloud;
@@ -42,17 +43,29 @@ impl Drawing {
         })
     }
 
-    /// The surface of a mesh; none of a cloud, and where the vertices are asked for.
     fn mesh(self, cloud: &Cloud) -> Result<Option<TriangleMesh>, Refusal> {
-        if self.vertices || !cloud.is_mesh() {
-            return Ok(None);
-        }
-        TriangleMesh::new(cloud.points.points(), &cloud.faces).map(Some).map_err(|e| {
-            let way_out =
-                format!("mend the mesh, or take its {} vertices by vertices=True", cloud.points.len());
-            Refusal::new(Fault::Input, format!("{}: {e}; {way_out}", cloud.name))
-        })
+        mesh(cloud, self.vertices)
     }
+}
+
+/// The surface of a mesh; none of a cloud, and where the vertices are asked for.
+fn mesh(cloud: &Cloud, vertices: bool) -> Result<Option<TriangleMesh>, Refusal> {
+    if vertices || !cloud.is_mesh() {
+        return Ok(None);
+    }
+    TriangleMesh::new(cloud.points.points(), &cloud.faces).map(Some).map_err(|e| {
+        let way_out = format!("mend the mesh, or take its {} vertices by vertices=True", cloud.points.len());
+        Refusal::new(Fault::Input, format!("{}: {e}; {way_out}", cloud.name))
+    })
+}
+
+/// The cloud; of a mesh, points of its surface, drawn as the program draws one that stands alone.
+///
+/// # Errors
+/// [`Fault::Input`] for a mesh whose faces make no surface.
+pub fn alone(cloud: &Cloud, vertices: bool, seed: u64) -> Result<Cloud, Refusal> {
+    let drawn = mesh(cloud, vertices)?.and_then(|mesh| points_alone(&mesh, cloud.points.len(), seed));
+    Ok(drawn.map_or_else(|| cloud.clone(), |points| cloud.with_points(points)))
 }
 
 fn meshed<'a>(cloud: &'a Cloud, mesh: Option<&'a TriangleMesh>) -> MeshedCloud<'a> {
