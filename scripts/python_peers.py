@@ -4,17 +4,17 @@
     python3 scripts/python_peers.py --wheel FILE
 
 Installs each into a clean virtual environment outside the checkout and prints one table (Markdown): the size that
-installing adds (with all that it asks for), seconds of the first import in a fresh process (median of 7), whether objects
+installing adds (with all that it asks for), the processor's seconds of a fresh process that imports it (median of 8), whether objects
 and results pickle, and whether it has types. Needs the network for the peers.
 """
 
 import argparse
 import os
+import resource
 import statistics
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 # NumPy by name: without it small_gicp 1.0.1 does not import, and it does not ask for it.
@@ -52,6 +52,14 @@ def size(folder):
     return sum(f.lstat().st_size for f in Path(folder).rglob("*") if f.is_file() and not f.is_symlink())
 
 
+def cpu(command):
+    """The processor's seconds of a command: other work on the machine disturbs them little."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
 def measure(name, requirements, module, folder):
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     python = str(Path(folder) / "bin/python")
@@ -62,23 +70,14 @@ def measure(name, requirements, module, folder):
                     "--only-binary", ":all:", *requirements], check=True)
     with_all = size(site) - empty
     own = sum(size(Path(site) / entry) for entry in os.listdir(site) if entry.replace("-", "_").startswith(module))
-    seconds = []
-    for _ in range(8):
-        begun = time.perf_counter()
-        subprocess.run([python, "-c", f"import {module}"], check=True, stdout=subprocess.DEVNULL)
-        seconds.append(time.perf_counter() - begun)
-    bare = []
-    for _ in range(8):
-        begun = time.perf_counter()
-        subprocess.run([python, "-c", "import numpy"], check=False, stderr=subprocess.DEVNULL)
-        bare.append(time.perf_counter() - begun)
+    seconds = [statistics.median(cpu([python, "-c", f"import {what}"]) for _ in range(8)) for what in (module, "numpy")]
     run = subprocess.run([python, "-c", PICKLE.format(make=MAKE[module])], capture_output=True, text=True)
     pickles = run.stdout.split() if run.returncode == 0 else ["?", "?"]
     if run.returncode:
         print(run.stderr.strip().splitlines()[-1], file=sys.stderr)
     package = Path(site) / module
     stubs = any(Path(site).glob(f"{module}*/**/py.typed")) or any(Path(site).glob(f"{module}*/**/*.pyi"))
-    return (name, own / 1e6, with_all / 1e6, statistics.median(seconds[1:]), statistics.median(bare[1:]), *pickles[-2:],
+    return (name, own / 1e6, with_all / 1e6, *seconds, *pickles[-2:],
             "yes" if stubs else "no")
 
 
@@ -88,7 +87,7 @@ def main():
     parser.add_argument("--only", help="one of them, such as kiss_matcher")
     arguments = parser.parse_args()
     wheel = arguments.wheel
-    print("| | package, MB | with all it asks for, MB | import, s | NumPy alone, s | object pickles | answer pickles | types |")
+    print("| | package, MB | with all it asks for, MB | import, CPU s | NumPy alone, CPU s | object pickles | answer pickles | types |")
     print("|---|---|---|---|---|---|---|---|")
     for name, (requirements, module) in PEERS.items():
         if arguments.only not in (None, module):

@@ -2,7 +2,7 @@
 """How many workers are worth having: where the workers, the driver or the store of the clouds is the limit.
 
     python3 scripts/simulate_cluster.py --results results.csv [--pairs 200000] [--batch 16] [--driver-ms 5]
-                                        [--store-gbit 10] [--pair-mb 1.0] [--seed 1]
+                                        [--store-gbit 10] [--pair-mb 1.0] [--mean SECONDS] [--seed 1]
 
 Service times are those of the column `seconds` of results of `srrf batch` (CSV; `srrf batch merge a.parquet -o a.csv` makes
 it), drawn with replacement. Each worker takes the next batch: the driver hands it out (`--driver-ms` a batch, one after the
@@ -48,6 +48,8 @@ def main():
     parser.add_argument("--driver-ms", type=float, default=5.0)
     parser.add_argument("--store-gbit", type=float, default=10.0)
     parser.add_argument("--pair-mb", type=float, default=1.0)
+    parser.add_argument("--mean", type=float, help="seconds a pair that the service times are scaled to, on average: the CPU seconds "
+                        "of scripts/scaling.py, where the machine was busy with other work")
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
     csv.field_size_limit(sys.maxsize)
@@ -56,6 +58,8 @@ def main():
     if not service:
         sys.exit(f"error: {args.results} has no seconds; give results of `srrf batch` as CSV")
     mean = sum(service) / len(service)
+    if args.mean is not None:
+        service, mean = [seconds * args.mean / mean for seconds in service], args.mean
     print(f"{args.pairs} pairs in batches of {args.batch}; {mean:.3f} s a pair (mean of {len(service)}); driver "
           f"{args.driver_ms} ms a batch; store {args.store_gbit} Gbit/s, {args.pair_mb} MB a pair; seed {args.seed}\n")
     print("| workers | pairs a second | workers busy | driver busy | store busy | hours | the limit |")

@@ -10,8 +10,9 @@ from ._srrf import program
 def main() -> None:
     """Runs the program with the arguments of the process."""
     sys.stdout.flush()
-    if threading.current_thread() is threading.main_thread():
-        # Python only notes Ctrl-C, and would look at it after the program's end.
+    here = threading.current_thread() is threading.main_thread()
+    if here and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        # Python only notes Ctrl-C, and would look at it after the program's end. Where it is ignored it stays so.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     sys.exit(program(sys.argv[1:]))
 

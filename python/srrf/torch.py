@@ -15,8 +15,8 @@ _TOGETHER = 64
 
 
 def collate(items: list[dict[str, Any]]) -> dict[str, Any]:
-    """A batch, for ``collate_fn`` of a ``DataLoader``: clouds of one size are stacked, and those that differ in size, as after a
-    ``cutout``, stay a list of tensors."""
+    """A batch, for ``collate_fn`` of a ``DataLoader``: clouds of one size are stacked, as those of a data set are, and those that
+    differ in size, as where items of several are joined, stay a list of tensors."""
     batch = {}
     for name in items[0]:
         values = [item[name] for item in items]
@@ -29,8 +29,8 @@ class PairDataset(IterableDataset[dict[str, Any]]):
     """Pairs as dictionaries of tensors: ``source`` and ``target`` (N, 3), ``target_from_source`` (4, 4).
 
     The pairs are those of ``srrf.pairs`` with the same options; by default the shapes are those to learn from. Workers of a
-    ``DataLoader`` share them without overlap; some corruptions change the number of points, and :func:`collate` takes all. Epoch 0 has the seed itself, and epoch ``e`` the seed plus ``e``: call
-    :meth:`set_epoch` before each.
+    ``DataLoader`` share them without overlap. All clouds have ``points`` points. Epoch 0 has the seed itself, and epoch ``e`` the
+    seed plus ``e``: call :meth:`set_epoch` before each.
 
     Args:
         shapes: number of shapes.

@@ -13,6 +13,7 @@ import time
 import numpy as np
 import pytest
 from clouds import box
+from processes import ended, heard
 
 import srrf
 
@@ -40,11 +41,11 @@ def test_ctrl_c_ends_whatever_runs(name):
         "except KeyboardInterrupt:\n    print('interrupted', flush=True)\n"
         "print(srrf.pairs(1, points=8)[0].severity, flush=True)\n"
     )
-    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, preexec_fn=heard)
     assert child.stdout.readline() == "ready\n"
     time.sleep(0.7)
     child.send_signal(signal.SIGINT)
-    out, _ = child.communicate(timeout=300)
+    out = ended(child, 120)
     assert child.returncode == 0 and out == "interrupted\n0\n", (child.returncode, out)
 
 
@@ -54,11 +55,15 @@ def test_ctrl_c_ends_the_program(tmp_path):
     for name in ("a", "b"):
         np.save(tmp_path / f"{name}.npy", rng.uniform(-1, 1, (200000, 3)))
     child = subprocess.Popen(
-        [sys.executable, "-m", "srrf", "a.npy", "b.npy"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [sys.executable, "-m", "srrf", "a.npy", "b.npy"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        preexec_fn=heard,
     )
     time.sleep(2.0)
     child.send_signal(signal.SIGINT)
-    child.communicate(timeout=120)
+    ended(child, 120)
     assert child.returncode in (130, -signal.SIGINT), child.returncode
 
 

@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from clouds import angle_deg, box, moved
+from processes import ended, heard
 
 import srrf
 
@@ -179,11 +180,11 @@ except KeyboardInterrupt:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child")
 def test_ctrl_c_ends_a_long_call():
-    child = subprocess.Popen([sys.executable, "-c", LONG], stdout=subprocess.PIPE, text=True)
+    child = subprocess.Popen([sys.executable, "-c", LONG], stdout=subprocess.PIPE, text=True, preexec_fn=heard)
     assert child.stdout.readline() == "ready\n"
     time.sleep(1.0)
     child.send_signal(signal.SIGINT)
-    out, _ = child.communicate(timeout=120)
+    out = ended(child, 120)
     assert child.returncode == 0 and out.startswith("interrupted\n"), (child.returncode, out)
     assert abs(float(out.splitlines()[1]) - 1) < 1e-6, "the next call works"
 
