@@ -72,7 +72,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         of_clouds.sort_by(f64::total_cmp);
         // On one thread the median: a cloud during which the processor did something else counts no more than another.
-        let seconds = if arguments.threads > 1 { wall } else { of_clouds[clouds.len() / 2] * clouds.len() as f64 };
+        let seconds =
+            if arguments.threads > 1 { wall } else { of_clouds[clouds.len() / 2] * clouds.len() as f64 };
         total += seconds;
         each.insert(kind.name().into(), json!(seconds * 1e3 / (5 * arguments.clouds) as f64));
     }
