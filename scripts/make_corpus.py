@@ -140,7 +140,7 @@ add("said-array.npz", npz(a=plain(), b=npy("'<f4'", (2, 3), bytes(24))), ["--arr
 
 def pcd(names="x y z", types="F F F", data="ascii", lines="", size="SIZE 4 4 4\n", version="0.7", body=None):
     fields = "COLUMNS" if version == ".5" else "FIELDS"
-    head = f"# .PCD v{version}\nVERSION {version}\n{fields} {names}\n{size}TYPE {types}\nCOUNT 1 1 1\n{lines}"
+    head = f"# .PCD v{version}\nVERSION {version}\n{fields} {names}\n{size}TYPE {types}\nCOUNT{' 1' * len(types.split())}\n{lines}"
     return (head + f"WIDTH {N}\nHEIGHT 1\nPOINTS {N}\nDATA {data}\n").encode() + (body or text().encode())
 
 
@@ -150,6 +150,20 @@ add("capitals.pcd", pcd("X Y Z"))
 add("capital-binary.pcd", pcd(data="BINARY", body=floats(P)))
 add("version-5.pcd", f"# .PCD v.5\nVERSION .5\nCOLUMNS x y z\nWIDTH {N}\nHEIGHT 1\nPOINTS {N}\nDATA ascii\n" + text())
 add("cut.pcd", pcd(data="binary", body=floats(P)[:-5]), error="cut short")
+
+
+def lzf(columns, zeros=0):
+    """A body of PCD in LZF: the columns as they are, then zeros as one zero and a copy of it."""
+    plain = b"".join(struct.pack(f"<{len(column)}f", *column) for column in columns)
+    packed = b"".join(bytes([len(part) - 1]) + part for part in (plain[i:i + 32] for i in range(0, len(plain), 32)))
+    if zeros:
+        packed += bytes([0, 0, 7 << 5, zeros - 10, 0])
+    return struct.pack("<II", len(packed), len(plain) + zeros) + packed
+
+
+add("packed.pcd", pcd(data="binary_compressed", body=lzf(zip(*P))))
+add("packed-zeros.pcd", pcd("x y z i", "F F F F", size="SIZE 4 4 4 4\n", data="binary_compressed", body=lzf(zip(*P), 4 * N)))
+add("packed-cut.pcd", pcd(data="binary_compressed", body=lzf(zip(*P))[:-5]), error="cut short")
 
 # PLY
 
@@ -275,6 +289,27 @@ def laszip1():
     return bytes(head) + vlr + bytes(28)
 
 
+def las(minor=2, kind=0, size=20, count=N, more=b"", cut=0):
+    """LAS 1.`minor` with points of format `kind`, each of `size` bytes of which all but x, y and z are zero."""
+    head = bytearray(375 if minor == 4 else 227)
+    head[:4], head[24:26] = b"LASF", bytes([1, minor])
+    struct.pack_into("<HIIBHI", head, 94, len(head), len(head), 0, kind, size, 0 if kind > 5 else count)
+    struct.pack_into("<6d", head, 131, STEP, STEP, STEP, 0, 0, 0)
+    if minor == 4:
+        struct.pack_into("<Q", head, 247, count)
+    body = b"".join(struct.pack("<3i", *[round(c / STEP) for c in p]) + bytes(size - 12) for p in P)
+    return bytes(head) + body[:len(body) - cut] + more
+
+
+STEP = 0.0001
+steps = [tuple(round(c / STEP) * STEP for c in p) for p in P]
+add("plain.las", las(), points=steps)
+add("colours.las", las(kind=2, size=26), points=steps)
+add("undescribed.las", las(kind=1, size=28 + 4), points=steps)
+add("las14.las", las(4, kind=6, size=30), points=steps)
+add("las14-old-points.las", las(4, kind=1, size=28), points=steps)
+add("more-bytes.las", las(more=b"more"), points=steps)
+add("cut.las", las(cut=7), error="cut short")
 add("laszip1.laz", laszip1(), error="LASzip 1")
 add("pointer.ply", "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n", error="git lfs pull")
 add("page.pcd", "<!DOCTYPE html><html></html>", error="web page")

@@ -52,6 +52,11 @@ fn killed_and_resumed_with_other_threads_equals_one_session() {
     train(&killed, &["--resume", "--threads", "1"]);
 
     assert!(parameters(&straight) == parameters(&killed), "the parameters differ");
+    for file in ["metrics.jsonl", "curve.svg"] {
+        let [one, other] =
+            [&straight, &killed].map(|folder| std::fs::read_to_string(folder.join(file)).unwrap());
+        assert_eq!(one, other, "{file}");
+    }
     for file in ["best.safetensors", "last.safetensors", "curve.svg", "config.toml", "metrics.jsonl"] {
         assert!(killed.join(file).metadata().unwrap().len() > 0, "{file}");
     }

@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use srrf_cloud::io::{
-    CloudFile, Contents, IoError, Kept, Note, Outgoing, ReadOptions, write_atomically, write_outgoing,
-    write_outgoing_to,
+    CloudFile, Contents, IoError, Kept, Note, Outgoing, ReadOptions, read_file, write_atomically,
+    write_outgoing, write_outgoing_to,
 };
 use srrf_cloud::{CloudError, PointCloud, Rigid, Solid};
 
@@ -101,6 +101,29 @@ pub fn read_solid(path: &Path, format: Option<&str>, options: ReadOptions) -> Re
     let input = read(path, format, options)?;
     Solid::new(&input.cloud).map_err(|e| Failure::cloud(&input.name, &e))?;
     Ok(input)
+}
+
+/// All bytes of a file of another kind, as far as `options` let it take memory. `should` says what it is there for, such as
+/// `it should be results of a batch`.
+///
+/// # Errors
+/// [`Failure::usage`], which names the file.
+pub fn read_bytes(path: &Path, options: &ReadOptions, should: &str) -> Result<Vec<u8>, Failure> {
+    read_file(path, options).map_err(|error| match error {
+        IoError::Read { source, .. } => {
+            Failure::usage(format!("cannot read {path:?}: {source}; {should}")).because(source)
+        }
+        other => other.into(),
+    })
+}
+
+/// As [`read_bytes`], of text.
+///
+/// # Errors
+/// As [`read_bytes`]; also where it is not UTF-8.
+pub fn read_text(path: &Path, options: &ReadOptions, should: &str) -> Result<String, Failure> {
+    String::from_utf8(read_bytes(path, options, should)?)
+        .map_err(|_| Failure::usage(format!("cannot read {path:?}: it is no text in UTF-8; {should}")))
 }
 
 /// Checks, before any work is done, that there is a place for `path`.
@@ -225,6 +248,21 @@ mod tests {
         assert!(error.contains("it is a folder"), "{error}");
         let error = check_output(&folder.path().join("none/a.txt")).unwrap_err().to_string();
         assert!(error.contains("does not exist; create it first"), "{error}");
+    }
+
+    #[test]
+    fn other_files_are_read_as_far_as_they_may_take_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path().join("a.jsonl");
+        std::fs::write(&place, [b'1', b'\n', 0xff]).unwrap();
+        let limited = |bytes| ReadOptions { max_memory: Some(bytes), ..ReadOptions::default() };
+        assert_eq!(read_bytes(&place, &limited(3), "it should be lines").unwrap(), [b'1', b'\n', 0xff]);
+        let error = read_bytes(&place, &limited(2), "it should be lines").unwrap_err().to_string();
+        assert!(error.contains("a.jsonl") && error.contains("--max-memory"), "{error}");
+        let error = read_text(&place, &limited(3), "it should be lines").unwrap_err().to_string();
+        assert!(error.contains("no text in UTF-8; it should be lines"), "{error}");
+        let error = read_text(&folder.path().join("none"), &limited(3), "it should be lines");
+        assert!(error.unwrap_err().to_string().ends_with("; it should be lines"));
     }
 
     #[cfg(unix)]

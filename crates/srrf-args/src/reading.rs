@@ -1,8 +1,12 @@
 //! Flags that say how files of clouds are read where they do not say so themselves.
 
-use clap::Args;
-use srrf_cloud::io::{PointColumns, PointLayout, ReadOptions};
+use std::collections::BTreeSet;
+use std::path::Path;
 
+use clap::Args;
+use srrf_cloud::io::{CloudFile, PointColumns, PointLayout, ReadOptions, ReadSwitch, Taken};
+
+use crate::failure::Failure;
 use crate::flags::value;
 use crate::numbers::{bytes, whole};
 
@@ -59,6 +63,59 @@ impl ReadFlags {
             keep_zeros: self.keep_zeros,
             max_memory: self.max_memory,
             folder: None,
+            shared: Vec::new(),
+        }
+    }
+
+    /// The library's options for each of these files; a switch holds for those whose formats take it.
+    ///
+    /// # Errors
+    /// [`Failure::usage`] for a switch that none of several files takes; one file alone refuses it itself.
+    pub fn options_for(&self, paths: &[impl AsRef<Path>]) -> Result<ReadOptions, Failure> {
+        if paths.len() < 2 {
+            return Ok(self.options());
+        }
+        let options = self.options().of_several();
+        check_taken(paths.iter().map(|path| (&options, || Taken::by(path.as_ref()))))?;
+        Ok(options)
+    }
+}
+
+/// Refuses switches that were said of several files together and say nothing to any of them. A file of which it is not
+/// known what it takes is believed to take them: reading it says what is wrong.
+///
+/// # Errors
+/// [`Failure::usage`], which names the switch.
+pub fn check_taken<'a, T: FnOnce() -> Option<Taken>>(
+    files: impl Iterator<Item = (&'a ReadOptions, T)>,
+) -> Result<(), Failure> {
+    let (mut taken, mut strange) = (Vec::new(), Vec::new());
+    let mut formats = BTreeSet::new();
+    for (options, taken_by_file) in files {
+        let first = |switch: ReadSwitch| switch == ReadSwitch::Scan && options.scan == Some(1);
+        let open =
+            options.shared.iter().copied().filter(|&switch| !taken.contains(&switch) && !first(switch));
+        let open: Vec<ReadSwitch> = open.collect();
+        if open.is_empty() {
+            continue;
+        }
+        let Some(file) = taken_by_file() else {
+            taken.extend(open);
+            continue;
+        };
+        for switch in open {
+            if file.switches.contains(&switch) { taken.push(switch) } else { strange.push(switch) }
+        }
+        formats.insert(format!("{} takes {}", file.format, file.words()));
+    }
+    match strange.into_iter().find(|switch| !taken.contains(switch)) {
+        None => Ok(()),
+        Some(switch) => {
+            let formats: Vec<String> = formats.into_iter().collect();
+            let (flag, formats) = (switch.flag(), formats.join("; "));
+            Err(Failure::usage(format!(
+                "`{flag}` says nothing to any of these files: {formats}; leave it out"
+            )))
         }
     }
 }
@@ -92,6 +149,15 @@ macro_rules! of_one_cloud {
             /// What holds of both clouds, but for what is said of this one.
             fn over(&self, both: &ReadFlags) -> ReadOptions {
                 let both = both.options();
+                let own = [
+                    (self.columns.is_some(), ReadSwitch::Columns),
+                    (self.array.is_some(), ReadSwitch::Array),
+                    (self.layout.is_some(), ReadSwitch::Layout),
+                    (self.scan.is_some(), ReadSwitch::Scan),
+                    (self.topic.is_some(), ReadSwitch::Topic),
+                    (self.message.is_some(), ReadSwitch::Message),
+                ];
+                let shared = both.switches().filter(|switch| !own.contains(&(true, *switch))).collect();
                 ReadOptions {
                     columns: self.columns.clone().or(both.columns),
                     array: self.array.clone().or(both.array),
@@ -102,6 +168,7 @@ macro_rules! of_one_cloud {
                     keep_zeros: both.keep_zeros,
                     max_memory: both.max_memory,
                     folder: None,
+                    shared,
                 }
             }
         }
@@ -152,12 +219,32 @@ impl PairReadFlags {
     pub fn target(&self) -> ReadOptions {
         self.target.over(&self.both)
     }
+
+    /// Refuses a switch for both that neither takes.
+    ///
+    /// # Errors
+    /// [`Failure::usage`].
+    pub fn check(&self, source: &CloudFile, target: &CloudFile) -> Result<(), Failure> {
+        let (of_source, of_target) = (self.source(), self.target());
+        let files = [(&of_source, source), (&of_target, target)];
+        check_taken(files.into_iter().map(|(options, file)| (options, || Some(file.taken()))))
+    }
 }
 
 /// What was asked, in words that stay the same: each option that is set, as `name=value`.
 pub fn described(options: &ReadOptions) -> Vec<String> {
-    let ReadOptions { columns, array, layout, scan, topic, message, keep_zeros, max_memory: _, folder: _ } =
-        options;
+    let ReadOptions {
+        columns,
+        array,
+        layout,
+        scan,
+        topic,
+        message,
+        keep_zeros,
+        max_memory: _,
+        folder: _,
+        shared: _,
+    } = options;
     [
         columns.as_ref().map(|v| format!("columns={v}")),
         array.as_ref().map(|v| format!("array={v}")),
@@ -193,6 +280,21 @@ mod tests {
         assert_eq!(described(&source), ["columns=x,y,z", "layout=4xf32", "scan=2"]);
         assert_eq!(described(&target), ["columns=2,3,4", "layout=4xf32"]);
         assert_eq!((source.max_memory, target.max_memory), (Some(2_000_000_000), Some(2_000_000_000)));
+    }
+
+    #[test]
+    fn a_switch_holds_for_the_files_that_take_it() {
+        let flags = |words: &str| Program::try_parse_from(words.split(' ')).unwrap().read;
+        let read = flags("p --columns x,y,z --layout kitti --target-columns 2,3,4");
+        assert_eq!(read.source().shared, [ReadSwitch::Columns, ReadSwitch::Layout]);
+        assert_eq!(read.target().shared, [ReadSwitch::Layout], "its columns were said of it alone");
+        let read = flags("p --columns x,y,z --layout kitti --scan 1").both;
+        let options = |names: &[&str]| read.options_for(names).map_err(|e| e.to_string());
+        assert_eq!(options(&["a.ply"]).unwrap().shared, [], "one file alone refuses what it does not take");
+        assert_eq!(options(&["a.ply", "a.csv", "a.bin"]).unwrap().shared.len(), 3);
+        let error = options(&["a.ply", "a.csv", "b.ply"]).unwrap_err();
+        assert!(error.contains("`--layout`") && error.contains("xyz takes --columns"), "{error}");
+        assert!(options(&["a.ply", "a.csv", "not-there"]).is_ok(), "reading says what is wrong");
     }
 
     #[test]

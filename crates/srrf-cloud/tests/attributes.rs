@@ -69,19 +69,21 @@ fn attributes_travel_between_formats() {
         match extension {
             "bin" => vec!["intensity"],
             "obj" => colours.to_vec(),
-            "off" => all[..6].to_vec(),
+            "off" | "glb" | "gltf" => all[..6].to_vec(),
             "e57" => all[..7].to_vec(),
             "pts" | "las" | "laz" => [colours, &["intensity"]].concat(),
             _ => all.to_vec(),
         }
     };
-    let extensions: Vec<&str> = ["ply", "pcd", "csv", "xyz", "npz", "npy", "pts", "bin", "obj", "off"]
-        .into_iter()
-        .chain(if cfg!(feature = "las") { vec!["las", "laz"] } else { Vec::new() })
-        .chain(cfg!(feature = "e57").then_some("e57"))
-        .chain(cfg!(feature = "parquet").then_some("parquet"))
-        .collect();
-    let sources = ["ply", "pcd", "csv", "xyz", "npz", "npy"];
+    let extensions: Vec<&str> =
+        ["ply", "pcd", "csv", "xyz", "npz", "npy", "pts", "bin", "obj", "off", "vtk", "vtp", "vtu"]
+            .into_iter()
+            .chain(if cfg!(feature = "gltf") { vec!["glb", "gltf"] } else { Vec::new() })
+            .chain(if cfg!(feature = "las") { vec!["las", "laz"] } else { Vec::new() })
+            .chain(cfg!(feature = "e57").then_some("e57"))
+            .chain(cfg!(feature = "parquet").then_some("parquet"))
+            .collect();
+    let sources = ["ply", "pcd", "csv", "xyz", "npz", "npy", "vtk", "vtp"];
     for from in sources.into_iter().chain(cfg!(feature = "parquet").then_some("parquet")) {
         let source = folder.path().join(format!("source.{from}"));
         assert!(write(&source, true).lost.is_empty(), "{from}");
@@ -102,7 +104,7 @@ fn attributes_travel_between_formats() {
                 let before = |i: usize| attribute.values.get(i).unwrap();
                 let mut expected: Vec<f64> = (0..3).map(before).collect();
                 // x becomes y, and y becomes -x; but a copy in the same text or archive turns no columns.
-                let turns = from != *to || ["ply", "pcd", "parquet"].contains(to);
+                let turns = from != *to || ["ply", "pcd", "parquet", "vtk", "vtp"].contains(to);
                 match name {
                     "nx" if turns => expected = vec![0.0, -1.0, 0.0],
                     "ny" if turns => expected = vec![1.0, 0.0, 0.0],
@@ -132,13 +134,17 @@ fn single_precision_stays() {
     let header = |name: &str| String::from_utf8_lossy(&std::fs::read(path(name)).unwrap()).into_owned();
     write(&path("single.ply"), true);
     write(&path("double.ply"), false);
+    let thirds = POINTS.map(|point| point.map(|c| c / 3.0));
+    write_outgoing(&path("fine.ply"), &Outgoing::of_points(&thirds)).unwrap();
     let far = Rigid { translation: [4_812_345.678, 0.0, 0.0].into(), ..motion() };
     for (from, to, motion, why, words) in [
         ("single.ply", "a.ply", motion(), None, "property float x"),
         ("single.ply", "a.pcd", motion(), None, "SIZE 4 4 4 4 4 4 4 4 4\nTYPE F F F F F F F F I"),
         ("single.ply", "a.npy", motion(), None, "[('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ('red', '<u1')"),
         ("double.ply", "b.ply", motion(), None, "property double x"),
-        ("double.ply", "b.pcd", motion(), Some(WhyDouble::AsOriginal), "SIZE 8 8 8"),
+        // Its numbers are those of single precision.
+        ("double.ply", "b.pcd", motion(), None, "SIZE 4 4 4"),
+        ("fine.ply", "f.pcd", motion(), Some(WhyDouble::AsOriginal), "SIZE 8 8 8"),
     ] {
         let kept = write_transformed(&path(from), &path(to), &motion).unwrap();
         assert_eq!(kept.double, why, "{from} to {to}");

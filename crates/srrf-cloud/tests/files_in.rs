@@ -276,14 +276,9 @@ fn switches_that_say_nothing_are_refused() {
             "a.off",
             off,
             ReadOptions { layout: "kitti".parse().ok(), ..d() },
-            ["`--layout`", "`--source-layout`", "off"],
+            ["`--layout`", "leave it out", "off"],
         ),
-        (
-            "a.off",
-            off,
-            ReadOptions { topic: Some("t".into()), ..d() },
-            ["`--topic`", "`--target-topic`", "off"],
-        ),
+        ("a.off", off, ReadOptions { topic: Some("t".into()), ..d() }, ["`--topic`", "leave it out", "off"]),
         (
             "a.xyz",
             xyz,

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-use srrf_args::{Output, OutputLock, Progress, interrupt, run_program};
+use srrf_args::{Failure, Output, OutputLock, Progress, interrupt, run_program};
 use srrf_cloud::profile;
 use srrf_eval::tables::{self, TablesProgress};
 use srrf_eval::{
@@ -33,7 +33,7 @@ fn main() -> ExitCode {
     })
 }
 
-fn run(options: &EvalOptions) -> Result<(), EvalError> {
+fn run(options: &EvalOptions) -> Result<(), Failure> {
     let (start, threads) = (Instant::now(), options.thread_count());
     if options.profile {
         profile::start();
@@ -41,6 +41,8 @@ fn run(options: &EvalOptions) -> Result<(), EvalError> {
     let context = MethodContext { weights: options.weights_by_method(), device: options.device.clone() };
     let mut set = MethodSet::new(&options.methods, DefaultRows::Plain, &context)?.without_held();
     report::prepare(&options.out)?;
+    let _lock = OutputLock::take(&options.out.join("report"))?;
+    let _lock_of_pairs = options.export_pairs.as_deref().map(OutputLock::take).transpose()?;
     let pairs = open_pairs(options)?;
     say(&format!("data: {}", pairs.description()));
     if options.pairs.is_none() {
@@ -57,7 +59,7 @@ fn run(options: &EvalOptions) -> Result<(), EvalError> {
         set.drop_oracle(!options.methods.is_empty())?;
     }
     if set.rows.is_empty() {
-        return Err(EvalError::Usage("no method is left to score".into()));
+        return Err(EvalError::Usage("no method is left to score".into()).into());
     }
     let weights = set.weights();
     if weights.is_empty() {

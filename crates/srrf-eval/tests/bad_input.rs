@@ -31,6 +31,24 @@ fn bad_options_are_named() {
 }
 
 #[test]
+fn one_process_at_a_time_writes_a_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    fs::create_dir(&out).unwrap();
+    let lock = srrf_args::OutputLock::take(&out.join("report")).unwrap();
+    let arguments = ["--output", "out", "--shapes", "1", "--methods", "identity", "--clean-only"];
+    let message = refusal(folder.path(), &arguments);
+    assert!(message.contains(&format!("process {} is writing it", std::process::id())), "{message}");
+    drop(lock);
+    let pairs = srrf_args::OutputLock::take(&folder.path().join("pairs.npz")).unwrap();
+    let message = refusal(folder.path(), &[&arguments[..], &["--export-pairs", "pairs.npz"]].concat());
+    assert!(message.contains("pairs.npz") && message.contains("is writing it"), "{message}");
+    drop(pairs);
+    run(folder.path(), &arguments);
+    assert!(out.join("table.md").exists() && !out.join(".report.lock").exists());
+}
+
+#[test]
 fn missing_data_say_where_and_what_works_without() {
     let folder = tempfile::tempdir().unwrap();
     let message = refusal(folder.path(), &["--data", "nowhere"]);

@@ -38,8 +38,8 @@ impl AskedReading {
             topic: self.topic,
             message: self.message,
             keep_zeros: true,
-            folder: None,
             max_memory: self.max_memory,
+            ..ReadOptions::default()
         })
     }
 }

@@ -82,6 +82,18 @@ pub struct RunProgress {
     pub wall_seconds: f64,
     /// Seconds of processor time in all sessions.
     pub cpu_seconds: f64,
+    /// The losses since the last line of the log, so that the next line is that of a run without a break.
+    #[serde(default)]
+    pub window: SavedWindow,
+}
+
+/// Sums of losses over some steps.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct SavedWindow {
+    /// By the names of the losses, as the bits of their sums: JSON may round numbers.
+    pub sums: BTreeMap<String, u64>,
+    /// Steps that had any.
+    pub steps: usize,
 }
 
 /// Writes the checkpoint of `folder`.

@@ -8,6 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use plotters::prelude::*;
 use serde_json::{Value, json};
 
+use crate::checkpoint::SavedWindow;
 use crate::seam::Losses;
 use crate::validate::Validation;
 
@@ -55,7 +56,7 @@ impl Log {
         epoch: f64,
         stage: &str,
         rate: f64,
-        losses: &Losses,
+        losses: &BTreeMap<String, f64>,
     ) -> std::io::Result<()> {
         let line = json!({ "kind": "train", "step": step, "epoch": round(epoch), "stage": stage,
             "learning_rate": rate, "losses": losses });
@@ -160,21 +161,33 @@ fn round(value: f64) -> f64 {
 /// The losses since the last line of the log.
 #[derive(Default)]
 pub struct LossWindow {
-    sums: Losses,
+    sums: BTreeMap<String, f64>,
     steps: usize,
 }
 
 impl LossWindow {
+    /// As a checkpoint has it.
+    pub fn of_saved(saved: &SavedWindow) -> Self {
+        let sums = saved.sums.iter().map(|(name, bits)| (name.clone(), f64::from_bits(*bits))).collect();
+        Self { sums, steps: saved.steps }
+    }
+
+    /// For a checkpoint.
+    pub fn saved(&self) -> SavedWindow {
+        let sums = self.sums.iter().map(|(name, sum)| (name.clone(), sum.to_bits())).collect();
+        SavedWindow { sums, steps: self.steps }
+    }
+
     /// Adds those of a step; none where it was left out.
     pub fn add(&mut self, losses: Losses) {
         self.steps += usize::from(!losses.is_empty());
         for (name, value) in losses {
-            *self.sums.entry(name).or_insert(0.0) += value;
+            *self.sums.entry(name.to_owned()).or_insert(0.0) += value;
         }
     }
 
     /// Their means; what follows is a new window.
-    pub fn mean(&mut self) -> Losses {
+    pub fn mean(&mut self) -> BTreeMap<String, f64> {
         let Self { sums, steps } = std::mem::take(self);
         sums.into_iter().map(|(name, sum)| (name, sum / steps.max(1) as f64)).collect()
     }
@@ -185,7 +198,7 @@ pub fn train_line(
     stage: &str,
     epoch: f64,
     rate: f64,
-    losses: &Losses,
+    losses: &BTreeMap<String, f64>,
     batch: usize,
     bar: &ProgressBar,
 ) -> String {

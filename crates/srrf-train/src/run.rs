@@ -168,7 +168,7 @@ impl<'a, C: Trained> Training<'a, C> {
         let (first, steps) = (run.progress.step, run.plan.steps());
         let end = options.until_step.unwrap_or(usize::MAX).min(steps);
         let bar = progress_bar(steps, first);
-        let mut window = LossWindow::default();
+        let mut window = LossWindow::of_saved(&run.progress.window);
         let mut saved = Instant::now();
         while run.progress.step < end && !stopped() {
             let step = run.progress.step;
@@ -188,6 +188,7 @@ impl<'a, C: Trained> Training<'a, C> {
                 bar.set_message(line);
                 run.log.train(step + 1, epoch, &stage.name, rate, &losses).map_err(|e| run.io(e))?;
             }
+            run.progress.window = window.saved();
             let last = step + 1 == steps;
             let due = (step + 1).is_multiple_of(run.plan.steps_in(config.keep.validate_epochs));
             if C::trains_poses(&stage.trains) && (due || last) {

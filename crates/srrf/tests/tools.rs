@@ -67,6 +67,26 @@ fn inspect_names_what_is_no_measurement() {
         done.code == 2 && done.err.contains("`--columns` says nothing to a file of the format ply"),
         "{done:?}"
     );
+    // Said of several files it holds for those that take it, and is refused where none does.
+    let done = scene.srrf(&["inspect", "--json", "source.ply", "huge.csv", "--columns", "3,2,1"]).ok();
+    let list: Value = serde_json::from_str(&done.out).unwrap();
+    let (plain, turned) = (json("huge.csv")["low"].clone(), list[1]["low"].clone());
+    assert_eq!((&turned[0], &turned[2]), (&plain[2], &plain[0]));
+    assert_eq!(list[0]["low"], json("source.ply")["low"]);
+    let nothing = "`--columns` says nothing to any of these files: ply takes none of the switches of reading";
+    scene.file("pairs.csv", "source,target\nsource.ply,target.ply\n");
+    for arguments in [
+        &["inspect", "source.ply", "target.ply"][..],
+        &["register", "source.ply", "target.ply"],
+        &["view", "source.ply", "target.ply", "-o", "page.html"],
+        &["align", "source.ply", "target.ply"],
+        &["batch", "pairs.csv", "-o", "results.jsonl"],
+    ] {
+        let done = scene.srrf(&[arguments, &["--columns", "3,2,1"]].concat());
+        assert!(done.code == 2 && done.err.contains(nothing), "{arguments:?}: {done:?}");
+    }
+    let done = scene.srrf(&["register", "source.ply", "huge.csv", "--source-columns", "3,2,1"]);
+    assert!(done.code == 2 && done.err.contains("says nothing to a file of the format ply"), "{done:?}");
 }
 
 #[test]

@@ -13,10 +13,11 @@ use serde_json::Value;
 const HEAD: &str = "<!-- Written by lab/parsers. -->
 # Parsers of other crates
 
-What five crates read of the files of their format in the corpus of `scripts/make_corpus.py`, with the simplest code around
+What seven crates read of the files of their format in the corpus of `scripts/make_corpus.py`, with the simplest code around
 them; SRRF reads all of these, or refuses them where they are broken. \"Refused\" in the second column is right.
 
-Rows as these are why SRRF has parsers of its own for NPY, OBJ, STL, PLY and PCD. LAZ (`laz`), E57 (`e57`), Parquet (`parquet`), glTF
+Rows as these are why SRRF has parsers of its own for NPY, OBJ, STL, PLY and PCD. `lzf`, with a caller that reads the header of a PCD, and `las` read
+all of theirs here, but for LAZ of LASzip 1, at which `las` panics: nothing in this table speaks against them. LAZ (`laz`), E57 (`e57`), Parquet (`parquet`), glTF
 (`gltf`), MCAP (`mcap`) and ZIP (`zip`) are read by crates.
 
 ";
@@ -76,16 +77,43 @@ fn pcd(path: &Path) -> Points {
     reader.map(|record| Ok(record?.to_xyz::<f32>().ok_or("no x, y, z")?.map(f64::from))).collect()
 }
 
+fn las(path: &Path) -> Points {
+    let mut reader = las::Reader::from_path(path)?;
+    let all = reader.read_all()?;
+    all.points().map(|point| point.map(|p| [p.x, p.y, p.z]).map_err(Into::into)).collect()
+}
+
+/// A PCD in LZF whose fields are 4 bytes each, x, y and z first.
+fn lzf(path: &Path) -> Points {
+    let bytes = std::fs::read(path)?;
+    let end = b"DATA binary_compressed\n";
+    let body = bytes.windows(end.len()).position(|w| w == end).ok_or("not in LZF")? + end.len();
+    let head = std::str::from_utf8(&bytes[..body])?;
+    let count: usize = head
+        .lines()
+        .find_map(|line| line.strip_prefix("POINTS "))
+        .ok_or("no POINTS")?
+        .parse()?;
+    let size = |at: usize| u32::from_le_bytes([0, 1, 2, 3].map(|i| bytes[body + at + i])) as usize;
+    let packed = bytes.get(body + 8..body + 8 + size(0)).ok_or("cut short")?;
+    let plain = lzf::decompress(packed, size(4)).map_err(|e| format!("{e:?}"))?;
+    let at = |place: usize| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|i| plain[4 * place + i])));
+    Ok((0..count).map(|i| [at(i), at(count + i), at(2 * count + i)]).collect())
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args().nth(1).ok_or("parsers FOLDER")?;
     std::panic::set_hook(Box::new(|_| ()));
     let manifest: Vec<Value> = serde_json::from_slice(&std::fs::read(format!("{folder}/manifest.json"))?)?;
-    let crates: [(&str, &str, fn(&Path) -> Points); 5] = [
+    let crates: [(&str, &str, fn(&Path) -> Points); 8] = [
         ("npyz 0.9.1", "npy", npy),
         ("tobj 4.0.5", "obj", obj),
         ("stl_io 0.11.0", "stl", stl),
         ("ply-rs-bw 4.0.1", "ply", ply),
         ("pcd-rs 0.13.0", "pcd", pcd),
+        ("lzf 1.0.0", "pcd", lzf),
+        ("las 0.11.2", "las", las),
+        ("las 0.11.2 with `laz`", "laz", las),
     ];
     let mut page = format!(
         "{HEAD}| crate | right | other points, no error | refused, though it can be read |\n|---|---|---|---|\n"
@@ -98,6 +126,10 @@ fn main() -> Result<(), Box<dyn Error>> {
                 continue;
             }
             let path = Path::new(&folder).join(file);
+            // That crate unpacks; only files that are packed are of its kind.
+            if name.starts_with("lzf") && !file.starts_with("packed") {
+                continue;
+            }
             let found = catch_unwind(|| read(&path).map_err(|e| e.to_string()));
             let cell = |words: &str| format!("`{file}` ({words})");
             match (found, case["points"].as_u64()) {

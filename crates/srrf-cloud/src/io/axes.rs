@@ -4,9 +4,9 @@ use super::{ColumnName, FormatError, PointColumns};
 
 /// Names of the coordinates in bare letters, apart from `x` and what is made of it.
 const SYNONYMS: [&[&str]; 3] = [
-    &["easting", "eastings", "east", "utmx", "utmeast", "utme", "eastingm"],
-    &["northing", "northings", "north", "utmy", "utmnorth", "utmn"],
-    &["height", "elevation", "altitude", "elev", "alt", "up", "utmz", "elevationz"],
+    &["easting", "eastings", "east", "utmx", "utmeast", "utme", "eastingm", "rechtswert", "ostwert"],
+    &["northing", "northings", "north", "utmy", "utmnorth", "utmn", "hochwert", "nordwert"],
+    &["height", "elevation", "altitude", "elev", "alt", "up", "utmz", "elevationz", "höhe", "hoehe"],
 ];
 /// What stands before or behind the letter of an axis, or the number 0, 1, 2.
 const AROUND: &[&str] = &[
@@ -25,6 +25,15 @@ const AROUND: &[&str] = &[
     "location",
     "loc",
     "xyz",
+    "vertex",
+    "field",
+    "local",
+    "global",
+    "world",
+    "map",
+    "lidar",
+    "sensor",
+    "cloud",
 ];
 /// Degrees, in bare letters.
 const DEGREES: &[&str] = &["lon", "long", "lng", "longitude", "lat", "latitude", "londeg", "latdeg"];
@@ -168,6 +177,11 @@ mod tests {
             ("easting|northing|z|height", [0, 1, 2]),
             ("east|north|up", [0, 1, 2]),
             ("vx|vy|vz|x|y|z", [3, 4, 5]),
+            ("time|field.header.seq|field.x|field.y|field.z", [2, 3, 4]),
+            ("x_lidar|y_lidar|z_lidar", [0, 1, 2]),
+            ("LocalX|LocalY|LocalZ", [0, 1, 2]),
+            ("vertex.x|vertex.y|vertex.z", [0, 1, 2]),
+            ("Rechtswert|Hochwert|Höhe", [0, 1, 2]),
             ("lon|lat|x|y|z", [2, 3, 4]),
         ] {
             assert_eq!(axes(names), Axes::Found(found), "{names}");
@@ -183,6 +197,7 @@ mod tests {
             "vx|vy|vz",
             "easting|y|z",
             "u|v|w",
+            "x_lidar|y_lidar|z_lidar|x_map|y_map|z_map",
             "pose.position.x|pose.position.y|pose.position.z",
         ] {
             assert_eq!(axes(names), Axes::Unknown, "{names}");

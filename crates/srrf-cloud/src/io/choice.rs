@@ -63,10 +63,9 @@ pub(super) fn detect(path: &Path, bytes: &[u8]) -> Result<&'static dyn CloudForm
         }
     }
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    if let (None, Some(what)) = (foreign::name(bytes), foreign::of_extension(&extension)) {
-        return Err(IoError::Foreign { path: path.to_owned(), what });
-    }
-    if let Some(what) = foreign::name(bytes) {
+    let by_content = foreign::name(bytes).filter(|_| !foreign::may_hold_anything(bytes));
+    let what = by_content.or_else(|| foreign::of_extension(&extension)).or_else(|| foreign::name(bytes));
+    if let Some(what) = what {
         return Err(IoError::Foreign { path: path.to_owned(), what });
     }
     Err(unknown(path, "neither the name nor the content says a known format"))

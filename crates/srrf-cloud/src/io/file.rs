@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use super::choice::{detect, extension_of, format_of, named};
 use super::outgoing::{NORMALS, fitted};
 use super::{
-    Attribute, CloudFormat, Contents, FORMATS, FormatError, IoError, PointLayout, ReadOptions, ScanEntry,
-    foreign,
+    Attribute, CloudFormat, Contents, FORMATS, FormatError, IoError, PointLayout, ReadOptions, ReadSwitch,
+    ScanEntry, Taken, foreign,
 };
 use super::{Kept, Outgoing, write_atomically};
 use crate::{CloudError, PointCloud, Rigid};
@@ -47,17 +47,19 @@ impl CloudFile {
         if let Some((file, number)) = &parts {
             path = file;
             options.scan = Some(*number);
+            options.shared.retain(|switch| *switch != ReadSwitch::Scan);
         }
         options.folder = path.parent().map(Path::to_owned);
         let known = format_of(path);
         if let Err(left_out @ IoError::LeftOut { .. }) = known {
             return Err(left_out);
         }
-        let bytes = read_file(path, &options)?;
+        let bytes = without_mark(read_file(path, &options)?);
         let format = match known {
             Ok(format) => format,
             Err(_) => detect(path, &bytes)?,
         };
+        Taken::of(format).pass_over(&mut options);
         // nuScenes names its sweeps so, and their points are always five numbers.
         let sweep = path.to_string_lossy().to_ascii_lowercase().ends_with(".pcd.bin");
         if sweep && options.layout.is_none() && bytes.len().is_multiple_of(PointLayout::NUSCENES.bytes()) {
@@ -89,11 +91,12 @@ impl CloudFile {
         }
         let format = format.map(named).transpose()?;
         let path = PathBuf::from("-");
-        let bytes = read_within(reader, 0, &path, &options)?;
+        let bytes = without_mark(read_within(reader, 0, &path, &options)?);
         let format = match format {
             Some(format) => format,
             None => detect(&path, &bytes)?,
         };
+        Taken::of(format).pass_over(&mut options);
         Ok(Self { path, bytes, format, options })
     }
 
@@ -117,11 +120,12 @@ impl CloudFile {
     /// # Errors
     /// [`IoError::Format`], [`IoError::OtherFormat`], and [`IoError::Cloud`] where there are no points.
     pub fn contents(&self) -> Result<Contents, IoError> {
-        let contents = self.read().map_err(|source| self.error(source))?;
-        if contents.points.is_empty() {
-            return Err(IoError::Cloud { path: self.path.clone(), source: CloudError::Empty });
+        let empty = || IoError::Cloud { path: self.path.clone(), source: CloudError::Empty };
+        if self.bytes.is_empty() {
+            return Err(empty());
         }
-        Ok(contents)
+        let contents = self.read().map_err(|source| self.error(source))?;
+        if contents.points.is_empty() { Err(empty()) } else { Ok(contents) }
     }
 
     /// All points, in the order of the file; shape `[n, 3]`, n > 0, any numbers.
@@ -159,29 +163,13 @@ impl CloudFile {
         self.format.read(&self.bytes, &self.options)
     }
 
-    /// Refuses options that say nothing to the format: whoever set them expects something of them.
+    /// The options that say something to the format.
+    pub fn taken(&self) -> Taken {
+        Taken::of(self.format)
+    }
+
     fn check_options(&self) -> Result<(), FormatError> {
-        let (name, takes) = (self.format.name(), self.format.takes());
-        if let Some(switch) = self.options.switches().find(|switch| !takes.contains(switch)) {
-            let flag = switch.flag();
-            let mut taken: Vec<&str> = takes.iter().map(|switch| switch.flag()).collect();
-            taken.extend(self.format.holds_scans().then_some("--scan"));
-            let taken = match taken.is_empty() {
-                true => "none of the switches of reading".to_owned(),
-                false => taken.join(", "),
-            };
-            return Err(FormatError::Content(format!(
-                "`{flag}` says nothing to a file of the format {name}, which takes {taken}; leave it out, or, where two \
-                 clouds are named, give it to the other one alone (`--source-{bare}`, `--target-{bare}`)",
-                bare = flag.trim_start_matches('-')
-            )));
-        }
-        match self.options.scan {
-            Some(number) if number != 1 && !self.format.holds_scans() => Err(FormatError::Content(format!(
-                "scan {number} is asked for, and a file of the format {name} holds one; leave the number out"
-            ))),
-            _ => Ok(()),
-        }
+        self.taken().check(&self.options)
     }
 
     /// The cloud.
@@ -340,12 +328,25 @@ impl std::fmt::Debug for CloudFile {
 }
 
 /// The file and the scan of a name such as `file.e57#2`, where no file has that very name.
-fn scan_of(path: &Path) -> Option<(PathBuf, usize)> {
+pub(super) fn scan_of(path: &Path) -> Option<(PathBuf, usize)> {
     let name = path.file_name()?.to_str()?;
     let (file, number) = name.rsplit_once('#')?;
     let file = path.with_file_name(file);
     let number = number.parse().ok()?;
     (!path.exists() && file.is_file()).then_some((file, number))
+}
+
+/// The mark of Unicode that editors put before a text goes where the format begins with a word of its own.
+fn without_mark(mut bytes: Vec<u8>) -> Vec<u8> {
+    const MARK: &[u8] = "\u{feff}".as_bytes();
+    let words = |format: &&&dyn CloudFormat| ["ply", "pcd", "off", "vtk"].contains(&format.name());
+    let marked = bytes
+        .strip_prefix(MARK)
+        .is_some_and(|rest| FORMATS.iter().filter(words).any(|format| format.recognises(rest)));
+    if marked {
+        bytes.drain(..MARK.len());
+    }
+    bytes
 }
 
 /// All bytes of a file of any kind, as far as they are allowed to take memory.

@@ -26,10 +26,22 @@ pub(super) fn name(bytes: &[u8]) -> Option<&'static str> {
     if begins("{") || begins("[{") {
         return Some("JSON; write the points as .csv, .ply or .npy");
     }
+    if begins("ncols ") || begins("ncols\t") {
+        return Some("a grid of heights (ESRI ASCII); make points of it with `gdal_translate -of XYZ`");
+    }
+    if begins("vertex_se3:quat") || begins("vertex_se2") || begins("edge_se3:quat") {
+        return Some("a graph of poses (g2o) and no cloud");
+    }
     MAGIC
         .iter()
         .find(|(at, magic, _)| bytes.get(*at..).is_some_and(|rest| rest.starts_with(magic)))
         .map(|m| m.2)
+}
+
+/// Whether the content says less than the name: archives, compressed files and XML hold files of many kinds.
+pub(super) fn may_hold_anything(bytes: &[u8]) -> bool {
+    let text = bytes.trim_ascii_start();
+    [&b"PK"[..], b"\x1f\x8b", b"<?xml", b"{"].iter().any(|begin| text.starts_with(begin))
 }
 
 /// Offsets, bytes there, and what they say.
@@ -101,16 +113,31 @@ const EXTENSIONS: &[(&[&str], &str)] = &[
     (&["rdbx", "rxp"], "a RIEGL scan; export it as .las or .e57 with RiSCAN PRO"),
     (&["bag", "db3"], "a ROS bag; write its clouds as .pcd, or convert it to MCAP"),
     (
-        &["fbx", "dae", "3ds", "blend", "3mf", "usd", "usdz"],
+        &[
+            "fbx", "dae", "3ds", "blend", "3mf", "usd", "usda", "usdc", "usdz", "wrl", "vrml", "x3d", "ctm",
+            "3dm", "skp", "max", "ma", "mb",
+        ],
         "a scene; convert it to .obj or .ply with Blender",
     ),
-    (&["step", "stp", "iges", "igs"], "a CAD model; mesh it as .stl or .obj with FreeCAD or Gmsh"),
+    (
+        &["step", "stp", "iges", "igs", "sat", "x_t", "sldprt", "catpart", "ipt", "ifc"],
+        "a CAD model; mesh it as .stl or .obj with FreeCAD or Gmsh",
+    ),
     (&["pkl", "pickle", "pt", "pth"], "pickled Python; write the array with `numpy.save` as .npy"),
     (&["mat"], "MATLAB; write the points with `writematrix(P, 'cloud.csv')`"),
     (
         &["pcap"],
         "packets of a scanner; write its clouds as .pcd or .las with the maker's program, such as VeloView",
     ),
+    (&["splat", "ksplat", "spz"], "Gaussian splats; export them as .ply with SuperSplat"),
+    (&["feather", "arrow", "ipc", "orc"], "a table in columns; write it as .parquet or .csv"),
+    (&["nc", "zarr"], "arrays of many dimensions; write the points with `numpy.save` as .npy"),
+    (&["ptg", "imp"], "a Leica scan; export it as .e57 or .pts with Cyclone"),
+    (
+        &["pnts", "b3dm", "osgb"],
+        "a tile of a scene; convert it to .las or .ply with py3dtiles or CloudCompare",
+    ),
+    (&["mtl"], "the materials of an OBJ; name the .obj beside it"),
     (&["xlsx", "xls", "ods"], "a spreadsheet; save it as .csv"),
     (&["jpg", "jpeg", "png", "tif", "tiff", "exr"], "a picture, which is no cloud"),
 ];

@@ -53,8 +53,10 @@ mod scan;
 mod scans;
 mod single;
 mod stl;
+mod taken;
 mod text;
 mod vtk;
+mod width;
 
 pub use arrays::{ArrayError, NpzArrays, read_npy, read_npz};
 pub use atomic::{place_of, remove_left_overs, write_atomically};
@@ -67,6 +69,7 @@ pub use options::{ColumnName, OptionError, PointColumns, PointLayout, ReadOption
 pub use outgoing::{Kept, Outgoing, WhyDouble};
 #[cfg(feature = "parquet")]
 pub use parquet::check_parquet;
+pub use taken::Taken;
 pub use text::parse_point;
 
 /// A file format for clouds.

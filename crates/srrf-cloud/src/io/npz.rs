@@ -55,7 +55,10 @@ impl CloudFormat for Npz {
     }
 
     fn recognises(&self, bytes: &[u8]) -> bool {
-        bytes.starts_with(b"PK\x03\x04")
+        // Other archives, such as spreadsheets, begin with another file.
+        let length = bytes.get(26..28).map_or(0, |size| usize::from(size[0]) | usize::from(size[1]) << 8);
+        let name = bytes.get(30..30 + length);
+        bytes.starts_with(b"PK\x03\x04") && name.is_some_and(|name| name.ends_with(b".npy"))
     }
 
     fn takes(&self) -> &'static [ReadSwitch] {
@@ -206,8 +209,10 @@ fn choose(archive: &mut Archive, options: &ReadOptions) -> Result<usize, FormatE
     };
     one.map(|(index, _, _)| *index).ok_or_else(|| {
         if counts[2] == 0 {
-            let problem =
-                format!("of the arrays {names:?} none has a shape [points, 3]; name the cloud `points`");
+            let problem = format!(
+                "of the arrays {names:?} none has a shape [points, 3]; save one that has, such as \
+                 `points=numpy.stack([x, y, z], axis=1)`"
+            );
             return FormatError::Content(problem);
         }
         let several: Vec<&str> = fitting().map(|(_, name, _)| name.as_str()).take(20).collect();

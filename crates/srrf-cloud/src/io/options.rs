@@ -30,6 +30,10 @@ pub struct ReadOptions {
     pub folder: Option<PathBuf>,
     /// Most bytes of memory that reading may take, the file's own included; half of the machine's without it.
     pub max_memory: Option<u64>,
+    /// Those of the options that were said of several files together: a file whose format takes one of them not passes it
+    /// over, and does not refuse it. Who sets them sees to it that some file takes each
+    /// ([`Taken`](super::Taken)).
+    pub shared: Vec<ReadSwitch>,
 }
 
 impl ReadOptions {
@@ -91,6 +95,8 @@ pub enum ReadSwitch {
     Array,
     /// [`ReadOptions::layout`]
     Layout,
+    /// [`ReadOptions::scan`]
+    Scan,
     /// [`ReadOptions::topic`]
     Topic,
     /// [`ReadOptions::message`]
@@ -104,6 +110,7 @@ impl ReadSwitch {
             Self::Columns => "--columns",
             Self::Array => "--array",
             Self::Layout => "--layout",
+            Self::Scan => "--scan",
             Self::Topic => "--topic",
             Self::Message => "--message",
         }
@@ -117,10 +124,29 @@ impl ReadOptions {
             self.columns.is_some().then_some(ReadSwitch::Columns),
             self.array.is_some().then_some(ReadSwitch::Array),
             self.layout.is_some().then_some(ReadSwitch::Layout),
+            self.scan.is_some().then_some(ReadSwitch::Scan),
             self.topic.is_some().then_some(ReadSwitch::Topic),
             self.message.is_some().then_some(ReadSwitch::Message),
         ];
         set.into_iter().flatten()
+    }
+
+    /// The same options, said of several files together.
+    pub fn of_several(mut self) -> Self {
+        self.shared = self.switches().collect();
+        self
+    }
+
+    /// Leaves out one of the options.
+    pub(super) fn leave_out(&mut self, switch: ReadSwitch) {
+        match switch {
+            ReadSwitch::Columns => self.columns = None,
+            ReadSwitch::Array => self.array = None,
+            ReadSwitch::Layout => self.layout = None,
+            ReadSwitch::Scan => self.scan = None,
+            ReadSwitch::Topic => self.topic = None,
+            ReadSwitch::Message => self.message = None,
+        }
     }
 }
 

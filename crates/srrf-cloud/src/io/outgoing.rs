@@ -165,10 +165,22 @@ pub(super) fn stays_single(old: &[[f64; 3]], new: &[[f64; 3]]) -> Result<(), f64
     }
 }
 
+/// Whether single precision holds all of these as they are.
+fn are_single(points: &[[f64; 3]]) -> bool {
+    points.iter().flatten().all(|&c| !c.is_finite() || f64::from(c as f32) == c)
+}
+
 /// The cloud as `format` takes it, in single precision only where that is enough, and what that keeps.
 pub(super) fn fitted<'a>(format: &dyn CloudFormat, cloud: &Outgoing<'a>) -> (Outgoing<'a>, Kept) {
+    // Numbers of single precision in a file of doubles, as NumPy makes them: many readers of PCD take no doubles.
+    let cloud = match cloud.before {
+        _ if format.name() != "pcd" => *cloud,
+        [] if are_single(cloud.points) => Outgoing { single: true, before: cloud.points, ..*cloud },
+        before if !before.is_empty() && are_single(before) => Outgoing { single: true, ..*cloud },
+        _ => *cloud,
+    };
     let single = if cloud.single { stays_single(cloud.before, cloud.points) } else { Ok(()) };
-    let cloud = Outgoing { single: cloud.single && single.is_ok(), ..*cloud };
+    let cloud = Outgoing { single: cloud.single && single.is_ok(), ..cloud };
     let double = match single {
         Err(moved) if format.has_both_precisions() => Some(WhyDouble::SingleWouldMove(moved)),
         Ok(()) if format.name() == "pcd" && !cloud.single => Some(WhyDouble::AsOriginal),
@@ -177,7 +189,7 @@ pub(super) fn fitted<'a>(format: &dyn CloudFormat, cloud: &Outgoing<'a>) -> (Out
     let (carried, lost): (Vec<&Attribute>, Vec<&Attribute>) =
         cloud.attributes.iter().partition(|attribute| format.keeps(attribute, &cloud));
     let names = |list: Vec<&Attribute>| list.into_iter().map(|attribute| attribute.name.clone()).collect();
-    let eight_bits = ["ply", "pcd"].contains(&format.name()) || cloud.extension == "pts";
+    let eight_bits = ["ply", "pcd", "glb", "gltf"].contains(&format.name()) || cloud.extension == "pts";
     let has_colours = carried.iter().any(|attribute| attribute.name == COLOURS[0]);
     let rounded_colours = has_colours && eight_bits && cloud.colours().is_some_and(|(_, rounded)| rounded);
     (cloud, Kept { carried: names(carried), lost: names(lost), double, rounded_colours })

@@ -23,8 +23,14 @@ pub(super) fn poses_not_points(
     let what = match (count, width) {
         (3 | 4, 4) => {
             let matrix: Vec<f64> = rows.map_while(|row| row.filter(|row| row.len() == 4)).flatten().collect();
-            is_rigid(&matrix).then_some("a pose (a matrix of 4 columns), not a cloud")
+            let transposed = || (0..16).map(|at| matrix[4 * (at % 4) + at / 4]).collect::<Vec<f64>>();
+            (is_rigid(&matrix) || (matrix.len() == 16 && is_rigid(&transposed())))
+                .then_some("a pose (a matrix of 4 columns), not a cloud")
         }
+        (6.., 4) => are_matrices(rows, count)
+            .then_some("poses (matrices of 4 columns, one under the other), not a cloud"),
+        (5.., 3) if count.is_multiple_of(5) => are_numbered_matrices(rows)
+            .then_some("poses (matrices with their numbers, as a .log has them), not a cloud"),
         (_, 12 | 16) => rows
             .all(|row| row.is_some_and(|row| is_rigid(&row)))
             .then_some("poses (a matrix in each row, as KITTI has them), not a cloud"),
@@ -42,6 +48,46 @@ pub(super) fn poses_not_points(
             "--columns",
         ))
     })
+}
+
+/// Whether all rows have 4 numbers and are rigid motions of 4 or of 3 rows, one under the other.
+fn are_matrices(rows: impl Iterator<Item = Option<Vec<f64>>>, count: usize) -> bool {
+    let mut rows = rows.map_while(|row| row.filter(|row| row.len() == 4));
+    let mut block: Vec<f64> = rows.by_ref().take(4).flatten().collect();
+    let height = match () {
+        () if count.is_multiple_of(4) && is_rigid(&block) => 4,
+        () if count.is_multiple_of(3) && block.len() == 16 && is_rigid(&block[..12]) => 3,
+        () => return false,
+    };
+    block.drain(..4 * height);
+    let mut seen = 4;
+    for row in rows {
+        seen += 1;
+        block.extend(row);
+        if block.len() == 4 * height {
+            if !is_rigid(&block) {
+                return false;
+            }
+            block.clear();
+        }
+    }
+    seen == count && block.is_empty()
+}
+
+/// Whether three numbers and a rigid motion of 4 rows come in turn.
+fn are_numbered_matrices(mut rows: impl Iterator<Item = Option<Vec<f64>>>) -> bool {
+    loop {
+        match rows.next() {
+            None => return true,
+            Some(Some(numbers)) if numbers.len() == 3 => {}
+            Some(_) => return false,
+        }
+        let matrix: Vec<f64> =
+            rows.by_ref().take(4).flatten().filter(|row| row.len() == 4).flatten().collect();
+        if matrix.len() != 16 || !is_rigid(&matrix) {
+            return false;
+        }
+    }
 }
 
 fn is_unit(numbers: &[f64]) -> bool {
@@ -76,6 +122,13 @@ mod tests {
         for (text, word) in [
             ("0 -1 0 5\n1 0 0 6\n0 0 1 7\n0 0 0 1", "matrix"),
             ("0 -1 0 5\n1 0 0 6\n0 0 1 7", "matrix"),
+            ("0 1 0 0\n-1 0 0 0\n0 0 1 0\n5 6 7 1", "matrix"),
+            (
+                "0 -1 0 5\n1 0 0 6\n0 0 1 7\n0 0 0 1\n1 0 0 5\n0 1 0 6\n0 0 1 7\n0 0 0 1",
+                "one under the other",
+            ),
+            ("0 -1 0 5\n1 0 0 6\n0 0 1 7\n1 0 0 5\n0 1 0 6\n0 0 1 7", "one under the other"),
+            ("0 0 1\n0 -1 0 5\n1 0 0 6\n0 0 1 7\n0 0 0 1", "with their numbers"),
             ("1 0 0 5 0 1 0 6 0 0 1 7\n0 -1 0 5 1 0 0 6 0 0 1 7", "KITTI"),
             ("1 0 0 5 0 1 0 6 0 0 1 7 0 0 0 1", "matrix in each row"),
             ("10.1 1 2 3 0 0 0 1\n10.2 1 2 4 0 0.6 0 0.8", "TUM"),
@@ -86,6 +139,8 @@ mod tests {
         }
         for text in [
             "1 2 3 4\n5 6 7 8\n9 1 2 3\n0 0 0 1",
+            "0 -1 0 5\n1 0 0 6\n0 0 1 7\n0 0 0 1\n1 2 3 4\n5 6 7 8\n9 1 2 3\n4 5 6 7",
+            "0 0 1\n0 0 2\n0 0 3\n0 0 4\n0 1 5",
             "1 2 3 0.5 0.5 0.5 9 9\n1 2 3 0 0 0 1 1",
             "1 2 3 0 0 1",
             "1 2 3 255 255 255 12\n4 5 6 1 1 1 1",

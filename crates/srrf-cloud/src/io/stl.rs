@@ -135,6 +135,10 @@ fn is_binary(bytes: &[u8]) -> Result<(bool, usize), FormatError> {
         _ if begins_solid(bytes) => {
             Err(FormatError::truncated("a text that ends with `endsolid`", format!("{} bytes", bytes.len())))
         }
+        Some(count) if extra.is_some() || count == 0 => Err(FormatError::Content(format!(
+            "the header says {count} triangles, and there is room for {}: the number at byte 80 is wrong; save the mesh again",
+            (bytes.len() - HEADER) / RECORD
+        ))),
         Some(count) => {
             let found = (bytes.len() - HEADER) as f64 / RECORD as f64;
             Err(FormatError::truncated(format!("a binary STL of {count} triangles"), format!("{found}")))

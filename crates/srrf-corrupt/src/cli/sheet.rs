@@ -8,6 +8,7 @@ use rand::{SeedableRng, rngs::ChaCha8Rng, seq::index};
 use srrf_args::flags::{Quiet, Seed, UpAxis, help, value};
 use srrf_args::numbers::{real, whole};
 use srrf_args::reading::ReadFlags;
+use srrf_args::surface::SurfaceFlag;
 use srrf_args::{Failure, Output, OutputKind, Places, files};
 use srrf_cloud::PointCloud;
 
@@ -68,6 +69,9 @@ pub struct SheetArgs {
     read: ReadFlags,
 
     #[command(flatten)]
+    surface: SurfaceFlag,
+
+    #[command(flatten)]
     quiet: Quiet,
 }
 
@@ -79,9 +83,11 @@ pub fn sheet(args: &SheetArgs) -> Result<ExitCode, Failure> {
     let places = Places::new().reads("the cloud", args.input.as_deref());
     places.writes("--output", &*args.output, OutputKind::PNG)?.check()?;
     let mut rng = ChaCha8Rng::seed_from_u64(args.seed.seed);
+    let mut drawn = None;
     let (cloud, name) = match &args.input {
         Some(path) => {
-            let input = files::read(path, None, args.read.options())?;
+            let mut input = files::read(path, None, args.read.options())?;
+            drawn = args.surface.draw_alone(&mut input, args.seed.seed)?;
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             (thinned(input.cloud, args.points, &mut rng)?.to_unit_sphere().0, name)
         }
@@ -101,8 +107,9 @@ pub fn sheet(args: &SheetArgs) -> Result<ExitCode, Failure> {
         .to_png()
         .map_err(Failure::other)?;
     files::write(&args.output, &png)?;
-    Output::new(args.quiet.quiet, files::is_stream(&args.output))
-        .say(&format!("wrote {}: 12 corruptions x 5 severities of {name}", args.output.display()));
+    let out = Output::new(args.quiet.quiet, files::is_stream(&args.output));
+    out.say(&format!("wrote {}: 12 corruptions x 5 severities of {name}", args.output.display()));
+    drawn.iter().for_each(|drawn| out.say(&format!("{name} is {}", drawn.text())));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -19,6 +19,7 @@ use super::align_initial::{self, EarlierMap};
 use super::align_merge::{MergedCloudArgs, merge};
 use super::align_moved;
 use super::align_page;
+use super::align_places::expanded;
 use super::align_poses;
 use super::align_scans::{ScanFiles, ScanReading};
 use super::align_summary::{shortened, summary};
@@ -121,12 +122,13 @@ pub fn run(args: &AlignArgs) -> Result<ExitCode, Failure> {
     let out = args.check()?;
     args.common.threads.start()?;
     let _locks = args.locks()?;
-    let known = args.add.as_deref().map(align_initial::read_result).transpose()?;
+    let options = args.read.options();
+    let known = args.add.as_deref().map(|path| align_initial::read_result(path, &options)).transpose()?;
     let progress = args.common.progress();
     progress.step("reading the scans, loading the network");
     let scans = args.open(known.as_ref())?;
     let initial = match (&args.initial, &known) {
-        (Some(path), _) => align_initial::read_initial(path, &scans.names())?,
+        (Some(path), _) => align_initial::read_initial(path, &scans.names(), &options)?,
         (None, Some(known)) => known.guesses(scans.len()),
         (None, None) if !args.ignore_poses && !args.sequence => scans.guesses(),
         (None, None) => Vec::new(),
@@ -149,7 +151,7 @@ pub fn run(args: &AlignArgs) -> Result<ExitCode, Failure> {
     if args.edges.is_some() {
         interrupt::advise("; the same command goes on where this one stopped");
     }
-    let options = AlignOptions {
+    let how = AlignOptions {
         initial,
         sequence: args.sequence,
         settled: known.as_ref().map_or(0, |k| k.scans.len()),
@@ -159,7 +161,7 @@ pub fn run(args: &AlignArgs) -> Result<ExitCode, Failure> {
         ..AlignOptions::default()
     };
     let signs = Signs::new(&progress);
-    let map = srrf_align::align(&scans, &registrar, &options, &edges, &|p| signs.show(p));
+    let map = srrf_align::align(&scans, &registrar, &how, &edges, &|p| signs.show(p));
     progress.clear();
     let map = map.map_err(|e| failed(e, &scans))?;
     edges.finish()?;
@@ -217,8 +219,9 @@ impl AlignArgs {
 
     fn open(&self, known: Option<&EarlierMap>) -> Result<ScanFiles, Failure> {
         let before: Vec<PathBuf> = known.map_or_else(Vec::new, EarlierMap::paths);
+        let files = [before.clone(), expanded(&self.scans)?].concat();
         let reading = ScanReading {
-            options: self.read.options(),
+            options: self.read.options_for(&files)?,
             memory: self.read.max_memory,
             vertices: self.surface.vertices,
         };

@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 use srrf_align::{PairAnswer, PairStore};
-use srrf_args::{Failure, interrupt};
+use srrf_args::{Failure, files, interrupt};
 
 use super::align_poses::{matrix, rigid_of};
 use super::align_scans::ScanFiles;
@@ -57,7 +57,7 @@ impl<'a> EdgeFile<'a> {
         let failed =
             |e: io::Error| Failure::failed(format!("cannot write {path:?}: {e}; choose another --edges"));
         let file = OpenOptions::new().read(true).append(true).create(true).open(path).map_err(failed)?;
-        let text = std::fs::read(path).map_err(failed)?;
+        let text = files::read_bytes(path, scans.options(), "it should hold the pairs of an earlier run")?;
         // A line without an end was cut off when the run was ended by force.
         let whole = text.iter().rposition(|b| *b == b'\n').map_or(0, |end| end + 1);
         edges.known = parse(&text[..whole], options).map_err(|(line, problem)| {

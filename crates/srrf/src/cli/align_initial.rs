@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::Deserialize;
-use srrf_args::Failure;
+use srrf_args::{Failure, files};
 use srrf_cloud::Rigid;
+use srrf_cloud::io::ReadOptions;
 
 use super::align_poses::{SCHEMA, SCHEMA_VERSION, rigid_of};
 
@@ -32,10 +33,8 @@ pub struct EarlierScan {
 ///
 /// # Errors
 /// [`Failure::usage`], which names the file and what is wrong with it.
-pub fn read_result(path: &Path) -> Result<EarlierMap, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| {
-        Failure::usage(format!("cannot read {path:?}: {e}; it should be what --output wrote"))
-    })?;
+pub fn read_result(path: &Path, options: &ReadOptions) -> Result<EarlierMap, Failure> {
+    let text = files::read_text(path, options, "it should be what --output wrote")?;
     let mut known = known_of(&text).map_err(|problem| Failure::usage(format!("{path:?}: {problem}")))?;
     known.folder = path.parent().map(Path::to_owned).unwrap_or_default();
     Ok(known)
@@ -86,10 +85,12 @@ impl EarlierMap {
 ///
 /// # Errors
 /// [`Failure::usage`], which names the file and what is wrong with it.
-pub fn read_initial(path: &Path, names: &[String]) -> Result<Vec<Option<Rigid>>, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| {
-        Failure::usage(format!("cannot read {path:?}: {e}; it should hold poses: JSON, TUM or KITTI"))
-    })?;
+pub fn read_initial(
+    path: &Path,
+    names: &[String],
+    options: &ReadOptions,
+) -> Result<Vec<Option<Rigid>>, Failure> {
+    let text = files::read_text(path, options, "it should hold poses: JSON, TUM or KITTI")?;
     initial_of(&text, names).map_err(|problem| Failure::usage(format!("{path:?}: {problem}")))
 }
 

@@ -25,6 +25,7 @@ use srrf_args::reading::{PairReadFlags, described as described_reading};
 use srrf_args::words::{count, counted};
 use srrf_args::{Failure, Output, OutputKind, OutputLock, Places, Progress};
 use srrf_args::{files, interrupt};
+use srrf_cloud::io::ReadOptions;
 
 mod csv;
 mod digest;
@@ -161,6 +162,8 @@ pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
     let threads = args.common.threads.start()?;
     let pairs = PairList::read(list, &args.read.source())?;
     pairs.read_by(places).check()?;
+    let reading = [args.read.source().of_several(), args.read.target().of_several()];
+    pairs.check_taken(&reading)?;
     let bar = args.common.progress();
     bar.step("loading the network");
     let registrar = Registrar::new(args.scale.options(args.method.options())).map_err(unusable)?;
@@ -187,7 +190,7 @@ pub fn run(args: &BatchArgs) -> Result<ExitCode, Failure> {
 
     bar.counted("registering", todo.len(), "pairs");
     let targets = SharedTargets::new(todo.iter().map(|row| &*row.target));
-    let batch = Batch { args, pairs: &pairs, registrar: &registrar, described: &described, targets };
+    let batch = Batch { args, pairs: &pairs, registrar: &registrar, described: &described, targets, reading };
     let (results, digest) = batch.run(&todo, threads, results, &bar)?;
     results.finish(&pairs.rows)?;
     bar.clear();
@@ -254,6 +257,8 @@ struct Batch<'a> {
     registrar: &'a Registrar,
     described: &'a Value,
     targets: SharedTargets,
+    /// How sources and targets are read.
+    reading: [ReadOptions; 2],
 }
 
 /// What the workers share.
@@ -335,7 +340,7 @@ impl Batch<'_> {
     }
 
     fn read_target(&self, row: &ListedPair) -> Result<Input, Failure> {
-        files::read_solid(&self.pairs.path(&row.target), None, self.args.read.target())
+        files::read_solid(&self.pairs.path(&row.target), None, self.reading[1].clone())
     }
 
     fn prepare(&self, row: &ListedPair, target: &Input) -> Result<Target, Failure> {
@@ -343,7 +348,7 @@ impl Batch<'_> {
     }
 
     fn register(&self, row: &ListedPair, ready: &ReadyTarget) -> Result<Value, Failure> {
-        let mut source = files::read_solid(&self.pairs.path(&row.source), None, self.args.read.source())?;
+        let mut source = files::read_solid(&self.pairs.path(&row.source), None, self.reading[0].clone())?;
         self.args.scale.apply(&mut source)?;
         let (one_unit, seed) = (self.args.scale.is_one_unit(), self.args.method.seed.seed);
         let (own, own_target);

@@ -50,9 +50,10 @@ pub fn run(args: &InspectArgs) -> Result<ExitCode, Failure> {
     let mut values = Vec::new();
     let mut failures = Vec::new();
     let progress = args.common.progress();
+    let options = args.read.options_for(&args.files)?;
     for path in &args.files {
         progress.step(format!("reading {path:?}"));
-        let inspected = inspect(path, args.read.options(), args.surface);
+        let inspected = inspect(path, options.clone(), args.surface);
         progress.clear();
         match inspected {
             Ok(found) if args.json => values.push(found.to_json()),

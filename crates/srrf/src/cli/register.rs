@@ -174,10 +174,10 @@ impl RegisterArgs {
     }
 
     fn read(&self) -> Result<(Input, Input), Failure> {
-        Ok((
-            files::read_solid(&self.source, self.source_format.as_deref(), self.read.source())?,
-            files::read_solid(&self.target, self.target_format.as_deref(), self.read.target())?,
-        ))
+        let source = files::read_solid(&self.source, self.source_format.as_deref(), self.read.source())?;
+        let target = files::read_solid(&self.target, self.target_format.as_deref(), self.read.target())?;
+        self.read.check(&source.file, &target.file)?;
+        Ok((source, target))
     }
 
     /// Writes what was asked for; says what was written.

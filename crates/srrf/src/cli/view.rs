@@ -72,6 +72,7 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode, Failure> {
     progress.step(format!("reading {:?} and {:?}", args.source, args.target));
     let mut source = files::read(&args.source, None, args.read.source())?;
     let mut target = files::read(&args.target, None, args.read.target())?;
+    args.read.check(&source.file, &target.file)?;
     let surfaces = args.surface.draw(&mut source, &mut target, true, 0)?;
     let values = ShownValues::of_pair(&source, &target);
     let mut pair = args.page.pair(&source, &target, &values);

@@ -11,6 +11,8 @@ const WORDS: f64 = 0.97;
 /// How improbable (as a natural logarithm) it has to be that a column of any of the file's numbers obeys its rule,
 /// for the rule to count as proof.
 const PROOF: f64 = 20.0;
+/// Fewest rows of a kind that are told from the others.
+const FEWEST: usize = 16;
 /// Largest intensity and ring.
 const INTENSITY: f64 = 65_535.0;
 const RING: f64 = 1024.0;
@@ -46,7 +48,18 @@ pub(super) fn find(bytes: &[u8]) -> Result<PointLayout, FormatError> {
     let proven: Vec<PointLayout> =
         fits.iter().filter(|(_, evidence)| *evidence >= PROOF).map(|(layout, _)| *layout).collect();
     match (&fits[..], &proven[..]) {
-        ([(layout, _)], _) | (_, [layout]) => Ok(*layout),
+        ([(layout, _)], _) | (_, [layout]) => match PlausibleRows::new(bytes, *layout).alternates() {
+            None => Ok(*layout),
+            Some(times) => {
+                let wider = PointLayout { numbers: times * layout.numbers, ..*layout };
+                Err(FormatError::unclear(
+                    format!(
+                        "of {times} points of {layout} one is of another kind than the others: points of {wider}?"
+                    ),
+                    "--layout",
+                ))
+            }
+        },
         ([], _) => Err(FormatError::unclear(
             "the numbers are no points in any usual layout (coordinates from 1e-7 to 1e8, intensities from 0): is this a file \
              of points? If so, what a point is has to be said, such as `4xf32`",
@@ -139,6 +152,26 @@ impl<'a> PlausibleRows<'a> {
         }
     }
 
+    /// Whether only every second or third row has coordinates like the others, so that a point has that many times more
+    /// numbers: by how many.
+    fn alternates(&self) -> Option<usize> {
+        [2, 3].into_iter().find(|&times| {
+            let rows = self.rows();
+            rows.is_multiple_of(times)
+                && rows >= FEWEST * times
+                && times * self.layout.numbers <= PointLayout::MOST
+                && (0..3).any(|column| {
+                    let share = |rule: fn(f64) -> bool, kind: usize| {
+                        let obey = self.column(column).skip(kind).step_by(times).filter(|&v| rule(v)).count();
+                        obey as f64 / (rows / times) as f64
+                    };
+                    let whole: Vec<f64> = (0..times).map(|kind| share(|v| v.fract() == 0.0, kind)).collect();
+                    let something = (0..times).all(|kind| share(|v| v != 0.0, kind) > 0.5);
+                    something && whole.contains(&1.0) && whole.iter().any(|&share| share < 0.5)
+                })
+        })
+    }
+
     /// A column from 0 to its own largest number, at most `most`.
     fn not_negative(&self, column: usize, most: f64) -> Option<f64> {
         let top = self.column(column).fold(0.0, f64::max);
@@ -207,6 +240,14 @@ mod tests {
             assert_eq!(find(&doubles(n, |i| vec![intensity(i)])), "4xf64", "{n}");
             assert_eq!(find(&doubles(n, normal)), "6xf64", "{n}");
         }
+    }
+
+    #[test]
+    fn wider_points_are_asked_for() {
+        let wide =
+            singles(40, |i| vec![intensity(i), (i % 31 + 1) as f64, (i * 7 % 255 + 1) as f64, 0.5, 3.0]);
+        let error = super::find(&wide).unwrap_err().to_string();
+        assert!(error.contains("points of 8xf32?") && error.ends_with("`--layout`"), "{error}");
     }
 
     #[test]

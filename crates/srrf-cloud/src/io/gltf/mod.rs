@@ -14,12 +14,14 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use gltf::binary::{Glb, Header};
 
+use super::outgoing::{COLOURS, NORMALS};
 use super::single::check_single;
 use super::{Attribute, AttributeValues, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
 use crate::Rigid;
 
 /// glTF files. The points of all meshes of the scene are read, each placed by its nodes; triangles,
-/// strips and fans are faces. Written with one list of points. A moved copy has a node
+/// strips and fans are faces. Written with one list of points, their colours in 8 bits and their
+/// normals. A moved copy has a node
 /// above all others; all else stays.
 pub(super) struct Gltf {
     /// `.glb`, or `.gltf` with everything in its JSON; both are read as what they are.
@@ -86,6 +88,11 @@ impl CloudFormat for Gltf {
         Ok(attributes)
     }
 
+    fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
+        let of = |names: [&str; 3]| names.contains(&attribute.name.as_str()) && cloud.triple(names).is_some();
+        of(COLOURS) || of(NORMALS)
+    }
+
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
         let points = cloud.points;
         check_single(points, "glTF")?;
@@ -93,16 +100,38 @@ impl CloudFormat for Gltf {
             let problem = "glTF holds neither empty clouds nor NaN; write .ply";
             return Err(FormatError::Unwritable(problem.into()).into());
         }
-        if points.len() > (u32::MAX as usize - (1 << 16)) / 12 {
+        if points.len() > (u32::MAX as usize - (1 << 16)) / 28 {
             let problem = format!("a .glb holds at most 4 GB, not {} points; write .ply", points.len());
             return Err(FormatError::Unwritable(problem).into());
         }
-        let bin: Vec<u8> = points.iter().flatten().flat_map(|&c| (c as f32).to_le_bytes()).collect();
+        let mut bin: Vec<u8> = points.iter().flatten().flat_map(|&c| (c as f32).to_le_bytes()).collect();
+        let count = points.len();
+        let (mut names, mut accessors, mut views) = (String::new(), String::new(), String::new());
+        let mut add = |name: &str, accessor: &str, bytes: Vec<u8>, bin: &mut Vec<u8>| {
+            let number = 1 + names.matches(':').count();
+            names += &format!(",\"{name}\":{number}");
+            accessors += &format!(",{{\"bufferView\":{number},\"count\":{count},{accessor}}}");
+            let (at, length) = (bin.len(), bytes.len());
+            views +=
+                &format!(",{{\"buffer\":0,\"byteOffset\":{at},\"byteLength\":{length},\"target\":34962}}");
+            bin.extend(bytes);
+        };
+        if let Some(normals) = cloud.triple(NORMALS) {
+            let parts = |point| normals.map(|part| part.values.get(point).unwrap_or(0.0) as f32);
+            let bytes = (0..count).flat_map(parts).flat_map(f32::to_le_bytes).collect();
+            add("NORMAL", "\"componentType\":5126,\"type\":\"VEC3\"", bytes, &mut bin);
+        }
+        if let Some((colours, _)) = cloud.colours() {
+            let bytes = colours.iter().flat_map(|&[r, g, b]| [r, g, b, 255]).collect();
+            let accessor = "\"componentType\":5121,\"normalized\":true,\"type\":\"VEC4\"";
+            add("COLOR_0", accessor, bytes, &mut bin);
+        }
         let bound = |axis: usize, pick: fn(f32, f32) -> f32| {
             points.iter().map(|point| point[axis] as f32).reduce(pick).unwrap_or_default()
         };
         let bounds = |pick| format!("[{},{},{}]", bound(0, pick), bound(1, pick), bound(2, pick));
-        let (low, high, count, length) = (bounds(f32::min), bounds(f32::max), points.len(), bin.len());
+        let (low, high, length) = (bounds(f32::min), bounds(f32::max), bin.len());
+        let of_points = 12 * count;
         let uri = if self.binary {
             String::new()
         } else {
@@ -110,10 +139,10 @@ impl CloudFormat for Gltf {
         };
         let json = format!(
             "{{\"asset\":{{\"version\":\"2.0\",\"generator\":\"srrf\"}},\"scene\":0,\"scenes\":[{{\"nodes\":[0]}}],\
-             \"nodes\":[{{\"mesh\":0}}],\"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":0}},\"mode\":0}}]}}],\
+             \"nodes\":[{{\"mesh\":0}}],\"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":0{names}}},\"mode\":0}}]}}],\
              \"accessors\":[{{\"bufferView\":0,\"componentType\":5126,\"count\":{count},\"type\":\"VEC3\",\
-             \"min\":{low},\"max\":{high}}}],\
-             \"bufferViews\":[{{\"buffer\":0,\"byteLength\":{length},\"target\":34962}}],\
+             \"min\":{low},\"max\":{high}}}{accessors}],\
+             \"bufferViews\":[{{\"buffer\":0,\"byteLength\":{of_points},\"target\":34962}}{views}],\
              \"buffers\":[{{{uri}\"byteLength\":{length}}}]}}"
         );
         if !self.binary {

@@ -21,7 +21,7 @@ impl NpyKind {
             b"i2" => Scalar::I16,
             b"i4" => Scalar::I32,
             b"i8" => Scalar::I64,
-            b"u1" | b"b1" => Scalar::U8, // booleans are bytes of 0 and 1
+            b"u1" | b"b1" => Scalar::U8, // fields of booleans are bytes of 0 and 1
             b"u2" => Scalar::U16,
             b"u4" => Scalar::U32,
             b"u8" => Scalar::U64,
@@ -99,6 +99,8 @@ pub(super) struct NpyHeader {
     pub descr: Descr,
     pub fortran: bool,
     pub shape: Vec<u64>,
+    /// Whether it is a plain array of truth values, which are read as 0 and 1.
+    pub booleans: bool,
     /// Offset of the first byte behind the header.
     pub body: usize,
 }
@@ -130,7 +132,7 @@ impl NpyHeader {
             None => return Err(short()),
         };
         let text = rest.get(begin..begin + length).ok_or_else(short)?;
-        let mut parser = Parser { rest: text };
+        let mut parser = Parser { rest: text, booleans: false };
         let mut header = parser.dictionary()?;
         header.body = 6 + begin + length;
         Ok(header)
@@ -181,6 +183,7 @@ impl NpyHeader {
 /// Goes through the text from the front; nothing in it is nested deeper than two levels.
 struct Parser<'a> {
     rest: &'a [u8],
+    booleans: bool,
 }
 
 impl<'a> Parser<'a> {
@@ -248,20 +251,31 @@ impl<'a> Parser<'a> {
             }
         }
         match (descr, fortran, shape) {
-            (Some(descr), Some(fortran), Some(shape)) => Ok(NpyHeader { descr, fortran, shape, body: 0 }),
+            (Some(descr), Some(fortran), Some(shape)) => {
+                Ok(NpyHeader { descr, fortran, shape, booleans: self.booleans, body: 0 })
+            }
             _ => Err(FormatError::Content("the NumPy header lacks descr, fortran_order or shape".into())),
         }
     }
 
     fn descr(&mut self) -> Result<Descr, FormatError> {
         if !self.eat(b'[') {
-            return Ok(Descr::Plain(NpyKind::parse(self.string()?)?));
+            let name = self.string()?;
+            self.booleans = name.ends_with(b"b1");
+            return Ok(Descr::Plain(NpyKind::parse(name)?));
         }
         let mut fields = Vec::new();
         while !self.eat(b']') {
             self.expect(b'(')?;
             let name = String::from_utf8_lossy(self.string()?).into_owned();
             self.expect(b',')?;
+            if self.rest.trim_ascii_start().starts_with(b"[") {
+                return Err(FormatError::Content(format!(
+                    "the field {} holds fields of its own; save its own array, `array[{}]`",
+                    quote(name.as_bytes()),
+                    quote(name.as_bytes())
+                )));
+            }
             let mut field = NpyField::new(name, self.string()?)?;
             // A third entry is the shape of an array inside the field.
             if self.eat(b',') && !self.rest.trim_ascii_start().starts_with(b")") {
@@ -270,6 +284,22 @@ impl<'a> Parser<'a> {
                 let size = count.and_then(|n| usize::try_from(n).ok()?.checked_mul(field.size));
                 field.size =
                     size.filter(|&size| size <= 1 << 30).ok_or_else(|| self.error("a smaller shape"))?;
+                // Some numbers in a row are fields of their own, which can be named.
+                if let ([count @ 1..=64], Some(_)) = (&shape[..], field.kind) {
+                    let size = field.size / *count as usize;
+                    let part = |number: u64| NpyField {
+                        name: format!("{}_{number}", field.name),
+                        size,
+                        ..field.clone()
+                    };
+                    fields.extend((0..*count).map(part));
+                    self.expect(b')')?;
+                    if !self.eat(b',') {
+                        self.expect(b']')?;
+                        break;
+                    }
+                    continue;
+                }
                 let axes: String = shape.iter().map(|axis| format!("{axis}, ")).collect();
                 field.descr = format!("{}, ({axes})", field.descr);
                 field.kind = None;

@@ -3,6 +3,7 @@
 mod array;
 mod columns;
 mod header;
+mod shape;
 
 pub use array::Array;
 pub(super) use columns::{array_of, columns};
@@ -10,10 +11,12 @@ pub(super) use columns::{array_of, columns};
 use std::io::{self, Write};
 
 use self::header::{Descr, NpyField, NpyHeader, NpyKind};
+use self::shape::{is_picture, rows_and_columns, squeezed};
 use super::outgoing::stays_single;
 use super::poses::poses_not_points;
 use super::scalar::Scalar;
 use super::scan::moved;
+use super::width::check_first_column;
 use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, ReadSwitch, axes};
 use crate::Rigid;
 
@@ -51,14 +54,26 @@ impl CloudFormat for Npy {
         if plain && options.columns.is_none() && table.cells.len() <= 16 {
             let rows = (0..table.rows).map(|row| Some(table.row(row)));
             poses_not_points(rows, table.rows)?;
+            if is_picture(shape, &table.header.descr) {
+                return Err(FormatError::unclear(
+                    format!(
+                        "an array of shape {shape:?} of 8-bit numbers is a picture; if its numbers are points all the same, such as 1,2,3"
+                    ),
+                    "--columns",
+                ));
+            }
+        }
+        let points = table.points();
+        if plain && options.columns.is_none() && table.cells.len() > 3 {
+            check_first_column(&points)?;
         }
         let single =
             table.axes.iter().all(|&axis| table.cells[axis].kind.is_some_and(|k| k.scalar.is_single()));
-        let mut contents = Contents { points: table.points(), single, ..Contents::default() };
+        let mut contents = Contents { points, single, ..Contents::default() };
         if shape.len() > if plain { 2 } else { 1 } {
             contents.notes.push(Note::Flattened { shape: shape.clone() });
         }
-        if let [height, width, _] = shape[..]
+        if let [height, width, _] = squeezed(shape)[..]
             && plain
             && height > 1
             && !table.header.fortran
@@ -207,44 +222,14 @@ pub(super) fn known(name: &str) -> String {
     }
 }
 
-/// Most columns of a row that is a point.
+/// Most columns of an array without rows.
 const MOST_COLUMNS: u64 = 64;
-
-/// Rows and columns of an array of this shape.
-///
-/// # Errors
-/// What is wrong with the shape, and the way out.
-fn rows_and_columns(shape: &[u64], asked: bool) -> Result<(u64, u64), FormatError> {
-    let wrong = |hint: &str| {
-        Err(FormatError::Content(format!(
-            "the array has shape {shape:?}, [points, 3] or wider is expected{hint}"
-        )))
-    };
-    let transposed = "; it looks transposed: save `array.T`, or say `--columns 1,2,3` if its rows are points";
-    let (Some(&columns), Some(rows)) =
-        (shape.last(), shape.iter().rev().skip(1).try_fold(1u64, |n, &axis| n.checked_mul(axis)))
-    else {
-        return wrong(", which no memory holds");
-    };
-    match shape {
-        [_] | [] => wrong("; is it a flat list of numbers? Save `array.reshape(-1, 3)`"),
-        [.., 4, 4] if shape.len() > 2 => wrong("; these are poses (4 x 4 matrices), not points"),
-        [3, _] if columns != 3 && columns > 4 && !asked => wrong(transposed),
-        [3, 1 | 2] => wrong("; transpose it"),
-        [4..=16, _] if columns > MOST_COLUMNS && !asked => wrong(transposed),
-        [_, _] if columns >= 3 => Ok((rows, columns)),
-        [.., 3, _] | [3, _, _] if columns != 3 => {
-            wrong("; it looks transposed: the last axis has to be x, y, z")
-        }
-        [_, _, ..] if shape.len() > 2 && (3..=16).contains(&columns) => Ok((rows, columns)),
-        _ => wrong(""),
-    }
-}
 
 /// Whether the array at the begin of `bytes` could be a cloud.
 pub(super) fn could_be_cloud(bytes: &[u8]) -> bool {
     let Ok(header) = NpyHeader::parse(bytes) else { return false };
     match &header.descr {
+        Descr::Plain(_) if header.booleans => false,
         Descr::Plain(_) => rows_and_columns(&header.shape, false).is_ok(),
         Descr::Fields(fields) => matches!(axes::find(&names(fields)), axes::Axes::Found(_)),
     }
@@ -257,6 +242,9 @@ fn names(fields: &[NpyField]) -> Vec<String> {
 impl<'a> NpyTable<'a> {
     pub fn parse(bytes: &'a [u8], options: &ReadOptions) -> Result<Self, FormatError> {
         let header = NpyHeader::parse(bytes)?;
+        if header.booleans {
+            return Err(FormatError::Content("the array holds truth values and no coordinates".into()));
+        }
         let body = &bytes[header.body..];
         let shape = &header.shape;
         let (rows, width, stride) = match &header.descr {

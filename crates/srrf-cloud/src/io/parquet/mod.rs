@@ -1,6 +1,7 @@
 //! Parquet, the format of tables in columns, by the `parquet` crate.
 
 mod columns;
+mod pages;
 mod table;
 mod thrift;
 mod write;

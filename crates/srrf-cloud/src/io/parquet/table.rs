@@ -9,7 +9,7 @@ use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReader
 use parquet::errors::ParquetError;
 
 use super::super::{FormatError, ReadOptions};
-use super::thrift;
+use super::{pages, thrift};
 
 /// Values and pages may unpack to this many times the file's size and `SLACK` more.
 const RATIO: u64 = 200;
@@ -103,15 +103,12 @@ impl Table {
             let mut values = 0u64;
             for group in self.metadata.metadata().row_groups() {
                 let Some(column) = group.columns().get(leaf) else { continue };
-                let [begin, length] = [
-                    column
-                        .dictionary_page_offset()
-                        .unwrap_or(column.data_page_offset())
-                        .min(column.data_page_offset()),
-                    column.compressed_size(),
-                ]
-                .map(|number| u64::try_from(number).unwrap_or(u64::MAX));
-                let pages = thrift::pages(&self.bytes, begin, begin.saturating_add(length))?;
+                // The same bytes as those that the crate reads.
+                let begin = column.dictionary_page_offset().unwrap_or(column.data_page_offset());
+                let [begin, length] =
+                    [begin, column.compressed_size()].map(|number| u64::try_from(number).unwrap_or(u64::MAX));
+                let end = begin.saturating_add(length);
+                let pages = pages::pages(&self.bytes, begin, end, column.compression())?;
                 values = values.saturating_add(pages.values);
                 largest = largest.max(pages.page);
             }

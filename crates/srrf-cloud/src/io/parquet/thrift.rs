@@ -4,27 +4,27 @@
 use super::super::FormatError;
 
 /// Structures inside one another; real schemas have fewer.
-const DEPTH: usize = 32;
+pub(super) const DEPTH: usize = 32;
 
 /// Types of fields.
-const TRUE: u8 = 1;
-const FALSE: u8 = 2;
+pub(super) const TRUE: u8 = 1;
+pub(super) const FALSE: u8 = 2;
 const BYTE: u8 = 3;
 const I16: u8 = 4;
-const I32: u8 = 5;
+pub(super) const I32: u8 = 5;
 const I64: u8 = 6;
 const DOUBLE: u8 = 7;
 const BINARY: u8 = 8;
 const LIST: u8 = 9;
 const SET: u8 = 10;
 const MAP: u8 = 11;
-const STRUCT: u8 = 12;
+pub(super) const STRUCT: u8 = 12;
 const UUID: u8 = 13;
 
 /// Reads from the front to the back; `None` at the end or where nothing makes sense.
-struct Thrift<'a> {
-    bytes: &'a [u8],
-    at: usize,
+pub(super) struct Thrift<'a> {
+    pub bytes: &'a [u8],
+    pub at: usize,
 }
 
 impl Thrift<'_> {
@@ -46,13 +46,13 @@ impl Thrift<'_> {
         None
     }
 
-    fn int(&mut self) -> Option<i64> {
+    pub fn int(&mut self) -> Option<i64> {
         let value = self.varint()?;
         Some((value >> 1) as i64 ^ -((value & 1) as i64))
     }
 
     /// The number and the type of the next field; `None` inside at the end of the structure.
-    fn field(&mut self, last: &mut i64) -> Option<Option<(i64, u8)>> {
+    pub fn field(&mut self, last: &mut i64) -> Option<Option<(i64, u8)>> {
         let byte = self.byte()?;
         if byte == 0 {
             return Some(None);
@@ -68,7 +68,7 @@ impl Thrift<'_> {
         Some((size, byte & 15))
     }
 
-    fn skip(&mut self, kind: u8, depth: usize) -> Option<()> {
+    pub fn skip(&mut self, kind: u8, depth: usize) -> Option<()> {
         let depth = depth.checked_sub(1)?;
         match kind {
             TRUE | FALSE => {}
@@ -108,7 +108,7 @@ impl Thrift<'_> {
     }
 }
 
-fn damaged(what: impl Into<String>) -> FormatError {
+pub(super) fn damaged(what: impl Into<String>) -> FormatError {
     FormatError::Content(format!("the Parquet file is damaged or cut short: {}", what.into()))
 }
 
@@ -173,60 +173,4 @@ fn schema(thrift: &mut Thrift) -> Option<Vec<i64>> {
         }
     }
     Some(children)
-}
-
-/// What a column takes once it is unpacked.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Unpacked {
-    /// Bytes of its largest page.
-    pub page: u64,
-    /// Values of all pages.
-    pub values: u64,
-}
-
-/// Looks at the headers of the pages of a column in `bytes[begin..end]`.
-pub(super) fn pages(bytes: &[u8], begin: u64, end: u64) -> Result<Unpacked, FormatError> {
-    let place = |at: u64| usize::try_from(at).ok().filter(|&at| at <= bytes.len());
-    let outside = || damaged(format!("a column up to byte {end}"));
-    let (mut at, end) = place(begin).zip(place(end)).ok_or_else(outside)?;
-    let mut all = Unpacked::default();
-    while at < end {
-        let mut thrift = Thrift { bytes: &bytes[..end], at };
-        let page = page(&mut thrift).ok_or_else(|| damaged("the header of a page makes no sense"))?;
-        let [unpacked, packed, values] = page.map(u64::try_from);
-        let (Ok(unpacked), Ok(packed), Ok(values)) = (unpacked, packed, values) else {
-            return Err(damaged("the header of a page has negative sizes"));
-        };
-        all.page = all.page.max(unpacked);
-        all.values = all.values.saturating_add(values);
-        at = usize::try_from(packed)
-            .ok()
-            .and_then(|packed| thrift.at.checked_add(packed))
-            .ok_or_else(outside)?;
-    }
-    Ok(all)
-}
-
-/// Unpacked size, packed size and number of values of a page.
-fn page(thrift: &mut Thrift) -> Option<[i64; 3]> {
-    let mut found = [0; 3];
-    let mut last = 0;
-    while let Some((id, kind)) = thrift.field(&mut last)? {
-        match (id, kind) {
-            (2 | 3, I32) => found[id as usize - 2] = thrift.int()?,
-            // Pages of data (two versions) and of a dictionary; their first field is the number of values.
-            (5 | 7 | 8, STRUCT) => {
-                let mut last = 0;
-                while let Some((inner, kind)) = thrift.field(&mut last)? {
-                    if (inner, kind) == (1, I32) {
-                        found[2] = thrift.int()?;
-                    } else {
-                        thrift.skip(kind, DEPTH)?;
-                    }
-                }
-            }
-            _ => thrift.skip(kind, DEPTH)?,
-        }
-    }
-    Some(found)
 }

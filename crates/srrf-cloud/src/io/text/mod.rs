@@ -14,6 +14,7 @@ use self::row::{QuotedComma, Style, Table, TextRow, of_thousands};
 use self::title::{TitleNames, is_comment, is_title};
 use super::poses::poses_not_points;
 use super::scan::{Line, Splice, moved, number};
+use super::width::{check_first_column, is_wide};
 use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, ReadSwitch};
 use crate::Rigid;
 
@@ -63,7 +64,10 @@ impl CloudFormat for Text {
             Ok::<_, FormatError>(())
         })?;
         poses.check()?;
-        if points.len() <= 3 && parsed.width > MOST_COLUMNS && options.columns.is_none() {
+        if parsed.guessed && parsed.width > 3 {
+            check_first_column(&points)?;
+        }
+        if parsed.guessed && is_wide(points.len() as u64, parsed.width as u64) {
             return Err(FormatError::unclear(
                 format!(
                     "{} rows of {} numbers look transposed; save the transpose, a point a line, or if a row is a point",
@@ -175,6 +179,8 @@ struct Parsed {
     numbered: bool,
     /// Fields of the first row.
     width: usize,
+    /// Whether nothing says that the first three are x, y and z.
+    guessed: bool,
     /// Rows that lack a coordinate.
     missing: usize,
 }
@@ -238,12 +244,12 @@ fn parse<E: From<FormatError>>(
             let title = heads.title.or(heads.comments.last().copied());
             table.look_at_tabs(title, std::iter::once(line.text).chain(lines.clone().map(|line| line.text)));
             parsed.width = title::width(table.style(line.text), line.text);
-            (table.columns, table.width) = match parsed.numbered {
+            (table.columns, table.width, parsed.guessed) = match parsed.numbered {
                 true => {
                     let index = usize::from(
                         heads.title.is_some_and(|title| title.trim_ascii_start().starts_with(b",")),
                     );
-                    ([index, index + 1, index + 2], 0)
+                    ([index, index + 1, index + 2], 0, false)
                 }
                 false => title::columns_of(&heads, &line, next, &table, options)?,
             };
@@ -285,11 +291,18 @@ impl PoseRows {
         let Some(rows) = &mut self.rows else { return };
         let fields = Style::of(line).fields(line).map(|(_, field)| number(field).ok());
         let row: Option<Vec<f64>> = fields.take(17).collect();
-        let usual = row.as_ref().is_some_and(|row| matches!(row.len(), 4 | 7 | 8 | 12 | 16));
+        let numbered = rows.len().is_multiple_of(5);
+        let usual = |row: &Vec<f64>| matches!(row.len(), 4 | 7 | 8 | 12 | 16) || (row.len() == 3 && numbered);
+        let usual = row.as_ref().is_some_and(usual);
         rows.push(row);
         // Poses look like poses from the first few rows on.
         let short = rows.len() <= 4;
-        let looks = || poses_not_points(rows.iter().cloned(), rows.len()).is_err();
+        let whole = |height: usize| rows.len() - rows.len() % height;
+        let looks = || {
+            [1, 3, 4, 5].iter().any(|&height| {
+                poses_not_points(rows.iter().take(whole(height)).cloned(), whole(height)).is_err()
+            })
+        };
         if !usual || (!short && rows.len().is_power_of_two() && !looks()) {
             self.rows = None;
         }

@@ -121,8 +121,8 @@ pub(super) fn width(style: Style, text: &[u8]) -> usize {
     fields.filter(|(_, (_, field))| !field.is_empty()).last().map_or(0, |(index, _)| index + 1)
 }
 
-/// The columns of x, y and z, from what stands before the `first` point and the line after it; and how many columns a
-/// title announces.
+/// The columns of x, y and z, from what stands before the `first` point and the line after it; how many columns a
+/// title announces; and whether nothing said which they are.
 ///
 /// # Errors
 /// [`FormatError`] where a title does not say them.
@@ -132,7 +132,7 @@ pub(super) fn columns_of(
     next: &[u8],
     table: &Table,
     options: &ReadOptions,
-) -> Result<([usize; 3], usize), FormatError> {
+) -> Result<([usize; 3], usize, bool), FormatError> {
     let width = width(table.style(first.text), first.text);
     let shift = |names: &[String]| usize::from(width == names.len() + 1 && has_index(first.text, next));
     let asked = options.columns.as_ref();
@@ -141,20 +141,21 @@ pub(super) fn columns_of(
         if names.len() >= 3 {
             let shift = shift(&names);
             let chosen = axes::choose(&names, asked);
-            return chosen.map(|axes| (axes.map(|axis| axis + shift), names.len() + shift));
+            return chosen.map(|axes| (axes.map(|axis| axis + shift), names.len() + shift, false));
         }
     }
-    columns_of_comments(heads, first, next, width, options).map(|columns| (columns, 0))
+    let columns = columns_of_comments(heads, first, next, width, options)?;
+    Ok((columns.unwrap_or([0, 1, 2]), 0, columns.is_none()))
 }
 
-/// As [`columns_of`], where no title says it.
+/// As [`columns_of`], where no title says it; `None` where no comment does either.
 fn columns_of_comments(
     heads: &TitleNames,
     first: &Line,
     next: &[u8],
     width: usize,
     options: &ReadOptions,
-) -> Result<[usize; 3], FormatError> {
+) -> Result<Option<[usize; 3]>, FormatError> {
     let shift = |names: &[String]| usize::from(width == names.len() + 1 && has_index(first.text, next));
     let asked = options.columns.as_ref();
     for comment in heads.comments.iter().rev().filter(|comment| comment.len() < LONGEST) {
@@ -163,17 +164,31 @@ fn columns_of_comments(
         match axes::find(&names) {
             axes::Axes::Found(axes) if fits && asked.is_none() && axes.iter().all(|&axis| axis < width) => {
                 let shift = shift(&names);
-                return Ok(axes.map(|axis| axis + shift));
+                return Ok(Some(axes.map(|axis| axis + shift)));
             }
-            axes::Axes::Degrees if names.len() == width => return axes::choose(&names, asked),
-            _ if asked.is_some() && names.len() == width => return axes::choose(&names, asked),
+            axes::Axes::Degrees if names.len() == width => return axes::choose(&names, asked).map(Some),
+            _ if asked.is_some() && names.len() == width => return axes::choose(&names, asked).map(Some),
+            // A title behind the mark of a comment, which says no more than that the first three need not be it.
+            axes::Axes::Unknown if width > 3 && names.len() == width && is_list(comment) => {
+                return axes::choose(&names, None).map(Some);
+            }
             _ => {}
         }
     }
     match asked {
-        Some(_) => axes::choose(&(1..=width.min(1000)).map(|n| n.to_string()).collect::<Vec<_>>(), asked),
-        None => Ok([0, 1, 2]),
+        Some(_) => {
+            let numbers: Vec<String> = (1..=width.min(1000)).map(|n| n.to_string()).collect();
+            axes::choose(&numbers, asked).map(Some)
+        }
+        None => Ok(None),
     }
+}
+
+/// Whether a comment is a list of names with something between them that is no blank.
+fn is_list(comment: &[u8]) -> bool {
+    let text = uncommented(comment);
+    let all_words = Style::of(text).fields(text).all(|(_, field)| number(field).is_err());
+    text.iter().any(|byte| b",;\t".contains(byte)) && all_words
 }
 
 /// Whether rows begin with their number or a name that the title does not count.

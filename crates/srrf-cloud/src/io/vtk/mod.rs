@@ -1,5 +1,6 @@
 //! The formats of VTK and ParaView: legacy files (`.vtk`) and XML files (`.vtp`, `.vtu`, `.vts`).
 
+mod arrays;
 mod blocks;
 mod cells;
 mod cursor;
@@ -17,12 +18,12 @@ use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadO
 use crate::Rigid;
 
 /// Legacy files of VTK, text and binary: POLYDATA, UNSTRUCTURED_GRID and STRUCTURED_GRID. Polygons,
-/// strips and flat cells are faces. Written as binary POLYDATA in double precision. A moved copy keeps
+/// strips and flat cells are faces. Written as binary POLYDATA, with attributes as arrays. A moved copy keeps
 /// all else as it is; normals are turned.
 pub(super) struct Vtk;
 
 /// XML files of VTK: PolyData, UnstructuredGrid and StructuredGrid, arrays as text, in base64 and behind
-/// the XML, packed by zlib or not. Written in double precision, with a cell for each point. A moved copy
+/// the XML, packed by zlib or not. Written with a cell for each point, and attributes as arrays. A moved copy
 /// has points and normals as text; all else stays.
 pub(super) struct VtkXml {
     kind: XmlKind,
@@ -103,7 +104,15 @@ impl CloudFormat for Vtk {
     }
 
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
-        write::legacy(cloud.points, out)
+        write::legacy(cloud, out)
+    }
+
+    fn keeps(&self, _: &Attribute, _: &Outgoing<'_>) -> bool {
+        true
+    }
+
+    fn has_both_precisions(&self) -> bool {
+        true
     }
 
     fn rewrite(
@@ -155,7 +164,15 @@ impl CloudFormat for VtkXml {
     }
 
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
-        write::xml(self.kind, cloud.points, out)
+        write::xml(self.kind, cloud, out)
+    }
+
+    fn keeps(&self, _: &Attribute, _: &Outgoing<'_>) -> bool {
+        true
+    }
+
+    fn has_both_precisions(&self) -> bool {
+        true
     }
 
     fn rewrite(

@@ -9,8 +9,9 @@ use serde_json::{Map, Value};
 use super::csv;
 use super::pair::{COLUMNS, ListedPair, Record};
 use super::parquet_list;
+use srrf_args::reading::check_taken;
 use srrf_args::{Failure, Places};
-use srrf_cloud::io::{IoError, ReadOptions, check_parquet, read_file};
+use srrf_cloud::io::{IoError, ReadOptions, Taken, check_parquet, read_file};
 
 /// The pairs of a batch.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +43,15 @@ impl PairList {
             }
         }
         places
+    }
+
+    /// Refuses switches of reading that none of the files takes of which they are said.
+    ///
+    /// # Errors
+    /// [`Failure::usage`], which names the switch.
+    pub fn check_taken(&self, [source, target]: &[ReadOptions; 2]) -> Result<(), Failure> {
+        let files = self.rows.iter().flat_map(|row| [(source, &row.source), (target, &row.target)]);
+        check_taken(files.map(|(options, file)| (options, || Taken::by(&self.path(file)))))
     }
 
     /// The path of a file that is written relative to the list.

@@ -7,13 +7,13 @@ use std::path::Path;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
-use srrf_cloud::io::write_atomically;
+use srrf_cloud::io::{ReadOptions, check_parquet, write_atomically};
 
 use super::csv;
 use super::parquet_list;
 use super::row::BatchRow;
 use super::table::{Format, TableWriter};
-use srrf_args::{Failure, interrupt};
+use srrf_args::{Failure, files, interrupt};
 
 /// What takes the rows of a file, one after the other; an error of it names what is wrong with the row.
 pub type Take<'a> = &'a mut dyn FnMut(BatchRow) -> Result<(), String>;
@@ -23,19 +23,20 @@ pub type Take<'a> = &'a mut dyn FnMut(BatchRow) -> Result<(), String>;
 /// # Errors
 /// [`Failure::usage`], which names the file and the line.
 pub fn each_row(path: &Path, take: Take<'_>) -> Result<(), Failure> {
-    let cannot = |e: std::io::Error| {
-        Failure::usage(format!("cannot read {path:?}: {e}; it should be results of a batch"))
-    };
+    let bytes = files::read_bytes(path, &ReadOptions::default(), "it should be results of a batch")?;
     let problem = |(place, problem): (String, String)| {
         Failure::usage(format!("{path:?}, {place}: {problem}; choose another file, or delete this one"))
     };
     match Format::of(path) {
-        Format::JsonLines => {
-            let text = std::fs::read(path).map_err(cannot)?;
-            lines(&text[..whole(&text)], take).map_err(problem)
+        Format::JsonLines => lines(&bytes[..whole(&bytes)], take).map_err(problem),
+        Format::Csv => csv_rows(&bytes, take).map_err(problem),
+        Format::Parquet => {
+            // What it unpacks to is checked before any of it is.
+            let damaged =
+                |e: String| problem(("its end".to_owned(), format!("not a whole Parquet file ({e})")));
+            check_parquet(&bytes, &ReadOptions::default()).map_err(|e| damaged(e.to_string()))?;
+            parquet_rows(File::open(path).map_err(|e| damaged(e.to_string()))?, take).map_err(problem)
         }
-        Format::Csv => csv_rows(&std::fs::read(path).map_err(cannot)?, take).map_err(problem),
-        Format::Parquet => parquet_rows(File::open(path).map_err(cannot)?, take).map_err(problem),
     }
 }
 
