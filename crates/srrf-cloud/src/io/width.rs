@@ -11,7 +11,7 @@ const STEPS: usize = 8;
 
 /// Whether a table is too wide for its height: a picture, or points as columns.
 pub(super) fn is_wide(rows: u64, columns: u64) -> bool {
-    columns > FEW && rows < columns.saturating_mul(ROWS)
+    rows > 0 && columns > FEW && rows < columns.saturating_mul(ROWS)
 }
 
 /// Refuses a first column that grows by the same step in each row, where more columns follow than x, y and z: it is
@@ -20,10 +20,11 @@ pub(super) fn is_wide(rows: u64, columns: u64) -> bool {
 /// # Errors
 /// [`FormatError::Unclear`].
 pub(super) fn check_first_column(points: &[[f64; 3]]) -> Result<(), FormatError> {
-    let [first, second, ..] = points else { return Ok(()) };
-    let (begin, step) = (first[0], second[0] - first[0]);
+    let [first, .., last] = points else { return Ok(()) };
+    let (begin, step) = (first[0], (last[0] - first[0]) / (points.len() - 1) as f64);
+    // Times of today have no more than three digits behind their steps.
     let in_step =
-        |(row, point): (usize, &[f64; 3])| (point[0] - (begin + step * row as f64)).abs() <= 1e-6 * step;
+        |(row, point): (usize, &[f64; 3])| (point[0] - (begin + step * row as f64)).abs() <= 1e-3 * step;
     if points.len() < STEPS || step <= 0.0 || !points.iter().enumerate().all(in_step) {
         return Ok(());
     }

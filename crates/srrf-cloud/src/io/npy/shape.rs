@@ -6,13 +6,12 @@ use super::super::width::is_wide;
 use super::header::{Descr, NpyKind};
 
 /// A shape without the axes of length 1 behind that of the coordinates.
-pub(super) fn squeezed(mut shape: &[u64]) -> &[u64] {
-    while let [rest @ .., 1] = shape
-        && let [_, .., 3..=16] = rest
-    {
-        shape = rest;
+pub(super) fn squeezed(shape: &[u64]) -> &[u64] {
+    let end = shape.iter().rposition(|&axis| axis != 1).map_or(0, |at| at + 1);
+    match &shape[..end] {
+        inner @ [_, .., 3..=16] => inner,
+        _ => shape,
     }
-    shape
 }
 
 /// Whether an array is rows and columns of colours.

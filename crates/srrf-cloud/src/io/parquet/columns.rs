@@ -1,14 +1,16 @@
 //! Which columns of a table are x, y and z, and their numbers.
 
+use std::sync::Arc;
+
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
     Decimal32Type, Decimal64Type, Decimal128Type, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type,
     Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, ArrayRef};
-use arrow_schema::{DataType, Schema};
+use arrow_schema::{DataType, Field, Schema};
 
-use super::super::{ColumnName, FormatError, PointColumns};
+use super::super::{ColumnName, FormatError, PointColumns, axes};
 
 /// Where the coordinates are.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,18 +102,11 @@ pub(super) fn find(schema: &Schema, columns: Option<&PointColumns>) -> Result<Pl
         }
         return Ok(Place::Columns(axes));
     }
-    let named = |name: &str| {
-        let mut found = (0..fields.len()).filter(|&i| fields[i].name().trim().eq_ignore_ascii_case(name));
-        found.next().filter(|&index| found.next().is_none() && is_number(fields[index].data_type()))
+    let number = |field: &Arc<Field>| {
+        if is_number(field.data_type()) { field.name().clone() } else { String::new() }
     };
-    let triples = [
-        ["x", "y", "z"],
-        ["easting", "northing", "height"],
-        ["pos_x", "pos_y", "pos_z"],
-        ["position_x", "position_y", "position_z"],
-    ];
-    let mut found = triples.iter().filter_map(|[x, y, z]| Some([named(x)?, named(y)?, named(z)?]));
-    if let Some(axes) = found.next() {
+    let numbers: Vec<String> = fields.iter().map(number).collect();
+    if let axes::Axes::Found(axes) = axes::find(&numbers) {
         return Ok(Place::Columns(axes));
     }
     let mut lists = LISTS.iter().filter_map(|name| {
@@ -124,7 +119,10 @@ pub(super) fn find(schema: &Schema, columns: Option<&PointColumns>) -> Result<Pl
         fields.iter().enumerate().filter_map(|(i, field)| Some((i, struct_axes(field.data_type())?)));
     match (structs.next(), structs.next()) {
         (Some((column, axes)), None) => Ok(Place::Struct(column, axes)),
-        _ => Err(unclear(format!("no columns x, y and z, but {:?}", names(schema)))),
+        _ if axes::find(&numbers) == axes::Axes::Degrees => {
+            Err(axes::choose(&numbers, None).err().unwrap_or_else(|| unclear("degrees".into())))
+        }
+        _ => Err(unclear(format!("no columns x, y and z of numbers, but {:?}", names(schema)))),
     }
 }
 

@@ -26,6 +26,10 @@ fn read(bytes: &[u8], options: &ReadOptions) -> Result<(Table, Place, Vec<[f64; 
     let place = columns::find(table.metadata.schema(), options.columns.as_ref())?;
     options.check_points(2 * bytes.len(), table.rows())?;
     let mut points = Vec::new();
+    // The pages of a table without rows are no pages at times.
+    if table.rows() == 0 {
+        return Ok((table, place, points));
+    }
     table.batches(&place.roots(), options, |batch| columns::points(&place, batch.columns(), &mut points))?;
     Ok((table, place, points))
 }

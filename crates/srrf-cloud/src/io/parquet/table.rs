@@ -6,6 +6,7 @@ use arrow_array::RecordBatch;
 use bytes::Bytes;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReaderBuilder};
+use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 
 use super::super::{FormatError, ReadOptions};
@@ -103,12 +104,22 @@ impl Table {
             let mut values = 0u64;
             for group in self.metadata.metadata().row_groups() {
                 let Some(column) = group.columns().get(leaf) else { continue };
+                let packing = column.compression();
+                if !matches!(packing, Compression::UNCOMPRESSED | Compression::SNAPPY | Compression::ZSTD(_))
+                {
+                    let name = format!("{packing:?}");
+                    let packing = name.split('(').next().unwrap_or_default();
+                    return Err(content(format!(
+                        "its columns are packed by {packing}; save it with compression \"snappy\", which pandas and pyarrow take \
+                         by themselves, or \"zstd\""
+                    )));
+                }
                 // The same bytes as those that the crate reads.
                 let begin = column.dictionary_page_offset().unwrap_or(column.data_page_offset());
                 let [begin, length] =
                     [begin, column.compressed_size()].map(|number| u64::try_from(number).unwrap_or(u64::MAX));
                 let end = begin.saturating_add(length);
-                let pages = pages::pages(&self.bytes, begin, end, column.compression())?;
+                let pages = pages::pages(&self.bytes, begin, end, packing)?;
                 values = values.saturating_add(pages.values);
                 largest = largest.max(pages.page);
             }

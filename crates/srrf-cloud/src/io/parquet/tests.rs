@@ -101,6 +101,28 @@ fn lists_and_structures() {
 }
 
 #[test]
+fn columns_are_known_by_their_names_as_in_a_text() {
+    let named = |names: [&str; 3]| {
+        let [x, y, z] = [0, 1, 2].map(|axis| doubles(&[EXPECTED[0][axis], EXPECTED[1][axis]]));
+        table(vec![(names[0], x), ("id", doubles(&[7.0, 8.0])), (names[1], y), (names[2], z)])
+    };
+    for names in
+        [["Easting", "Northing", "Elevation"], ["x [m]", "y [m]", "z [m]"], ["field.x", "field.y", "field.z"]]
+    {
+        assert_eq!(points(&named(names)).unwrap(), EXPECTED, "{names:?}");
+    }
+    let error = points(&named(["lon", "lat", "alt"])).unwrap_err().to_string();
+    assert!(error.contains("degrees"), "{error}");
+    let words: ArrayRef = Arc::new(StringArray::from(vec!["1", "2"]));
+    let error = points(&table(vec![("x", words.clone()), ("y", words.clone()), ("z", words)])).unwrap_err();
+    assert!(error.to_string().contains("of numbers"), "{error}");
+    assert_eq!(
+        points(&table(vec![("x", doubles(&[])), ("y", doubles(&[])), ("z", doubles(&[]))])).unwrap().len(),
+        0
+    );
+}
+
+#[test]
 fn columns_are_asked_for_by_name() {
     let bytes = table(vec![
         ("a", doubles(&[0.0, 0.0])),

@@ -1,6 +1,7 @@
 //! CSV: the fields of records, and fields in text.
 
 use csv_core::ReadFieldResult;
+use srrf_args::words::visible;
 
 /// The fields of each record, trimmed, with the line that it begins on.
 ///
@@ -33,6 +34,13 @@ pub fn records(mut bytes: &[u8]) -> Result<Vec<(u64, Vec<String>)>, String> {
     }
 }
 
+/// Words of others as neither a spreadsheet nor a terminal obeys them: behind `'` what would be a formula, control
+/// characters written out. The column `answer` has them as they are.
+pub fn harmless(text: &str) -> String {
+    let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
+    format!("{}{}", if formula { "'" } else { "" }, visible(text))
+}
+
 /// A line of fields, in quotes where they need them.
 pub fn line<'a>(fields: impl IntoIterator<Item = &'a str>) -> String {
     let quoted = |field: &str| {
@@ -50,6 +58,20 @@ pub fn line<'a>(fields: impl IntoIterator<Item = &'a str>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn words_of_others_command_nothing() {
+        for (text, harmless) in [
+            ("=1+1", "'=1+1"),
+            ("@a", "'@a"),
+            ("-x", "'-x"),
+            ("-1.5e3", "-1.5e3"),
+            ("a=b", "a=b"),
+            ("\u{1b}[31mred", "\\u{1b}[31mred"),
+        ] {
+            assert_eq!(super::harmless(text), harmless);
+        }
+    }
 
     #[test]
     fn fields_come_back() {

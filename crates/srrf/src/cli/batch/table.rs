@@ -66,6 +66,7 @@ impl<'a> TableWriter<'a> {
     /// Those of `out`.
     pub fn new(format: Format, columns: &'a [String], out: &'a mut dyn Write) -> io::Result<Self> {
         if format == Format::Csv {
+            let columns: Vec<String> = columns.iter().map(|name| csv::harmless(name)).collect();
             let names = COLUMNS.into_iter().chain(columns.iter().map(String::as_str));
             out.write_all(csv::line(names).as_bytes())?;
         }
@@ -133,10 +134,10 @@ fn words(value: Option<&Value>) -> Option<String> {
 
 fn csv_line(row: &BatchRow, columns: &[String]) -> String {
     let number = |way: &[&str]| row.number(way).map_or_else(String::new, |n| n.to_string());
-    let text = |key: &str| row.text(key).unwrap_or_default().to_owned();
+    let text = |key: &str| csv::harmless(row.text(key).unwrap_or_default());
     let spaced = |numbers: &[f64]| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
     let fixed = [
-        row.id().to_owned(),
+        csv::harmless(row.id()),
         text("source"),
         text("target"),
         text("initial"),
@@ -151,7 +152,7 @@ fn csv_line(row: &BatchRow, columns: &[String]) -> String {
         text("error"),
         row.to_line(),
     ];
-    let of_list = columns.iter().map(|name| words(row.column(name)).unwrap_or_default());
+    let of_list = columns.iter().map(|name| csv::harmless(&words(row.column(name)).unwrap_or_default()));
     let fields: Vec<String> = fixed.into_iter().chain(of_list).collect();
     csv::line(fields.iter().map(String::as_str))
 }
