@@ -1,6 +1,6 @@
 //! Which format a file has: by its extension, by its content, or by a name.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{CloudFormat, FORMATS, IoError, foreign};
 use crate::CloudError;
@@ -30,6 +30,15 @@ pub(super) fn format_of(path: &Path) -> Result<&'static dyn CloudFormat, IoError
 /// The format of this name or extension.
 pub(super) fn named(name: &str) -> Result<&'static dyn CloudFormat, IoError> {
     find(Path::new(name), &name.to_ascii_lowercase(), "this is the name of no known format")
+}
+
+/// The file and the scan of a name such as `file.e57#2`, where no file has that very name.
+pub(super) fn scan_of(path: &Path) -> Option<(PathBuf, usize)> {
+    let name = path.file_name()?.to_str()?;
+    let (file, number) = name.rsplit_once('#')?;
+    let file = path.with_file_name(file);
+    let number = number.parse().ok()?;
+    (!path.exists() && file.is_file()).then_some((file, number))
 }
 
 fn find(path: &Path, name: &str, fact: &'static str) -> Result<&'static dyn CloudFormat, IoError> {

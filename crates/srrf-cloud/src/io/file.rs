@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use super::choice::{detect, extension_of, format_of, named};
+use super::choice::{detect, extension_of, format_of, named, scan_of};
 use super::outgoing::{NORMALS, fitted};
 use super::{
     Attribute, CloudFormat, Contents, FORMATS, FormatError, IoError, PointLayout, ReadOptions, ReadSwitch,
@@ -325,15 +325,6 @@ impl std::fmt::Debug for CloudFile {
             .field("bytes", &bytes)
             .finish()
     }
-}
-
-/// The file and the scan of a name such as `file.e57#2`, where no file has that very name.
-pub(super) fn scan_of(path: &Path) -> Option<(PathBuf, usize)> {
-    let name = path.file_name()?.to_str()?;
-    let (file, number) = name.rsplit_once('#')?;
-    let file = path.with_file_name(file);
-    let number = number.parse().ok()?;
-    (!path.exists() && file.is_file()).then_some((file, number))
 }
 
 /// The mark of Unicode that editors put before a text goes where the format begins with a word of its own.

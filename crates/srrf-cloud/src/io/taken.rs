@@ -4,8 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::choice::{detect, format_of};
-use super::file::scan_of;
+use super::choice::{detect, format_of, scan_of};
 use super::{CloudFormat, FormatError, ReadOptions, ReadSwitch};
 
 /// Bytes of a file by which its format is known where its name does not say it.
