@@ -35,7 +35,7 @@ pub(super) fn pages(
     while at < end {
         let mut thrift = Thrift { bytes: &bytes[..end], at };
         let page = page(&mut thrift).ok_or_else(|| damaged("the header of a page makes no sense"))?;
-        let Page { unpacked, packed, values, .. } = page;
+        let PageHeader { unpacked, packed, values, .. } = page;
         let [unpacked, packed, values] = [unpacked, packed, values].map(u64::try_from);
         let (Ok(unpacked), Ok(packed), Ok(values)) = (unpacked, packed, values) else {
             return Err(damaged("the header of a page has negative sizes"));
@@ -59,7 +59,7 @@ pub(super) fn pages(
 
 /// The header of a page.
 #[derive(Debug, Clone, Copy, Default)]
-struct Page {
+struct PageHeader {
     /// Bytes before and after packing.
     unpacked: i64,
     packed: i64,
@@ -70,7 +70,7 @@ struct Page {
     plain: bool,
 }
 
-impl Page {
+impl PageHeader {
     /// Most bytes that `body` can unpack to.
     fn most(self, body: &[u8], packing: Compression) -> u64 {
         let levels = usize::try_from(self.levels).unwrap_or(usize::MAX).min(body.len());
@@ -104,8 +104,8 @@ fn zstd_size(frame: &[u8]) -> Option<u64> {
     Some(u64::from_le_bytes(number) + if size == 2 { 256 } else { 0 })
 }
 
-fn page(thrift: &mut Thrift<'_>) -> Option<Page> {
-    let mut found = Page::default();
+fn page(thrift: &mut Thrift<'_>) -> Option<PageHeader> {
+    let mut found = PageHeader::default();
     let mut last = 0;
     while let Some((id, kind)) = thrift.field(&mut last)? {
         match (id, kind) {
