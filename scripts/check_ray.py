@@ -105,8 +105,11 @@ def main():
     assert not different, (len(different), expected[different[0]], found[different[0]])
     failed = sum(row["error"] is not None for row in found.values())
     size = sum(f.stat().st_size for f in Path("out").iterdir())
-    again = subprocess.run([sys.executable, "-m", "srrf.ray", "pairs.parquet", "out"], capture_output=True, text=True)
+    command = [sys.executable, "-m", "srrf.ray", "pairs.parquet", "out"]
+    again = subprocess.run([*command, "--method", "icp"], capture_output=True, text=True)
     assert again.returncode == 0 and f"{count} done already" in again.stderr, again
+    other = subprocess.run(command, capture_output=True, text=True)
+    assert other.returncode == 2 and "answers by other options" in other.stderr, other
     print(f"{count} pairs, an actor killed: no row lost, none twice, {failed} errors as rows, all equal to `srrf batch`")
     print(f"srrf {srrf.__version__}: batch {seconds:.1f} s, Ray with its start {ray_seconds:.1f} s, {size / count:.0f} bytes a row")
 
