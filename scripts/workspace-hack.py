@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
 """Keeps `cargo build -p X` from compiling a dependency again that the built workspace has.
 
-    python3 scripts/workspace-hack.py          # nothing compiled twice? (compiles members at most; CI)
+    python3 scripts/workspace-hack.py          # would anything be compiled twice? By Cargo's plans, in seconds (CI)
+    python3 scripts/workspace-hack.py --build  # the same by building each member, in minutes
     python3 scripts/workspace-hack.py --write  # writes crates/workspace-hack/Cargo.toml anew, then `cargo check`
 
 Cargo gives a dependency the features that the chosen members ask for, so one member alone may get it with other
 features than all of them together, and with it everything above. The crate `workspace-hack`, on which every member
 depends, asks for the features of all of them. --write compares Cargo's own plans for each member and for the
-workspace, and needs no compiler. The check builds each member and fails where Cargo compiled anything that is not a
-member. (cargo-hakari does the same; it takes minutes to install and has no say in what CI may trust.)
+workspace, and needs no compiler; so does the check. --build builds each member and fails where Cargo compiled anything
+that is not a member. (cargo-hakari does the same; it takes minutes to install and has no say in what CI may trust.)
 """
 
 import argparse
@@ -85,24 +86,41 @@ def write():
 
 
 def check():
+    """Compares the plan of each member with the workspace's: what has other features there is compiled again."""
+    everything = plan("--workspace", "--all-targets")
+    again = {}
+    for member in members():
+        alone = plan("-p", member)
+        again[member] = [f"{name} {version}" for (name, version, host), found in alone.items() if not found <= everything[name, version, host]]
+    report(again)
+
+
+def build():
     """Builds each member by itself in a workspace that is built; what Cargo compiles then must be members alone."""
     subprocess.run(["cargo", "build", "--workspace", "--locked", "--quiet"], cwd=ROOT, check=True)
-    wrong = 0
+    again = defaultdict(list)
     for member in members():
         command = ["cargo", "build", "--locked", "--quiet", "-p", member, "--message-format", "json"]
         found = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
-        again = set()
+        again[member] = []
         for line in found.splitlines():
             message = json.loads(line)
             if message["reason"] == "compiler-artifact" and not message["fresh"] and message["package_id"].startswith("registry"):
-                again.add(message["package_id"].rsplit("#", 1)[1])
-        wrong += len(again)
-        print(f"cargo build -p {member}: {len(again)} dependencies compiled again {' '.join(sorted(again))}")
-    if wrong:
+                again[member].append(message["package_id"].rsplit("#", 1)[1])
+    report(again)
+
+
+def report(again):
+    """Says what each member compiles again, and fails where that is something."""
+    for member, names in again.items():
+        print(f"cargo build -p {member}: {len(names)} dependencies compiled again {' '.join(sorted(names))}")
+    if any(again.values()):
         sys.exit("run `python3 scripts/workspace-hack.py --write`, and see that each member depends on workspace-hack")
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write", action="store_true", help="write the manifest anew")
-    write() if parser.parse_args().write else check()
+    parser.add_argument("--build", action="store_true", help="check by building")
+    asked = parser.parse_args()
+    write() if asked.write else build() if asked.build else check()
