@@ -22,7 +22,7 @@ Reading = Literal["paper", "modelnet40_c"]
 _SEEDS = 2**64 - 1
 #: More would not fit into the memory of most machines.
 _MOST_SHAPES = 1_000_000
-_MOST_POINTS = 10_000_000
+_MOST_POINTS = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)

@@ -102,11 +102,14 @@ impl Default for PairConfig {
     }
 }
 
+/// Most points of a cloud of a pair.
+const MOST_POINTS: usize = 1_000_000;
+
 /// Why a [`PairConfig`] makes no sense.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum InvalidConfig {
-    /// A pair needs points.
-    #[error("`points` is {0}: a pair needs at least 3 points in each cloud")]
+    /// A pair needs points, and no end of memory is asked for.
+    #[error("`points` is {0}: a pair needs at least 3 points in each cloud, and has at most {MOST_POINTS}")]
     Points(usize),
     /// The range of angles is not one.
     #[error("`max_deg` is {0}: it must be between 0 and 360 degrees")]
@@ -125,7 +128,7 @@ impl PairConfig {
     /// # Errors
     /// [`InvalidConfig`] names the first bad one.
     pub fn validate(&self) -> Result<(), InvalidConfig> {
-        if self.points < 3 {
+        if !(3..=MOST_POINTS).contains(&self.points) {
             return Err(InvalidConfig::Points(self.points));
         }
         if let RotationRange::EulerAxes { max_deg } = self.rotation
@@ -172,6 +175,8 @@ mod tests {
         };
         assert_eq!(with(|_| {}), Ok(()));
         assert_eq!(with(|c| c.points = 2), Err(InvalidConfig::Points(2)));
+        assert_eq!(with(|c| c.points = MOST_POINTS), Ok(()));
+        assert_eq!(with(|c| c.points = 1_000_001), Err(InvalidConfig::Points(1_000_001)));
         assert_eq!(with(|c| c.translation = -1.0), Err(InvalidConfig::Translation(-1.0)));
         assert!(with(|c| c.rotation = RotationRange::EulerAxes { max_deg: f64::NAN }).is_err());
         assert!(with(|c| c.variants.impulse_linf = -0.1).is_err());
