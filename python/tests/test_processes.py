@@ -21,10 +21,10 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child
 
 # Each is far longer than the wait, on any machine.
 LONG = {
-    "pairs": "[srrf.pairs(50, seed=seed).take(range(3000)) for seed in range(1000)]",
+    "pairs": "for seed in range(1000): srrf.pairs(50, seed=seed).take(range(3000))",
     "align": "srrf.align([rng.uniform(-1, 1, (20000, 3)) for _ in range(40)], num_threads=1)",
-    "corrupt": "[srrf.corrupt(big, 'distortion_rbf') for _ in range(1000)]",
-    "prepared": "[ready.register(big, target) for target in [ready.prepare(big)] * 1000]",
+    "corrupt": "for _ in range(1000): srrf.corrupt(big, 'distortion_rbf')",
+    "prepared": "for target in [ready.prepare(big)] * 1000: ready.register(big, target)",
 }
 
 
