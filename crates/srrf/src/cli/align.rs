@@ -219,13 +219,14 @@ impl AlignArgs {
 
     fn open(&self, known: Option<&EarlierMap>) -> Result<ScanFiles, Failure> {
         let before: Vec<PathBuf> = known.map_or_else(Vec::new, EarlierMap::paths);
-        let files = [before.clone(), expanded(&self.scans)?].concat();
+        let given = expanded(&self.scans)?;
+        let files = [&before[..], &given].concat();
         let reading = ScanReading {
             options: self.read.options_for(&files)?,
             memory: self.read.max_memory,
             vertices: self.surface.vertices,
         };
-        let scans = ScanFiles::open(&before, &self.scans, &reading)?;
+        let scans = ScanFiles::open(&before, &given, &reading)?;
         if let Some(folder) = &self.moved {
             let mut places = Places::new();
             for (name, file) in align_moved::names(&scans)? {

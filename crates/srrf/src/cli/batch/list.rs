@@ -1,7 +1,6 @@
 //! The list of pairs of a batch: CSV, JSON lines or Parquet.
 
 use std::collections::HashMap;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
@@ -10,8 +9,8 @@ use super::csv;
 use super::pair::{COLUMNS, ListedPair, Record};
 use super::parquet_list;
 use srrf_args::reading::check_taken;
-use srrf_args::{Failure, Places};
-use srrf_cloud::io::{IoError, ReadOptions, Taken, check_parquet, read_file};
+use srrf_args::{Failure, Places, files};
+use srrf_cloud::io::{ReadOptions, Taken, check_parquet};
 
 /// The pairs of a batch.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,17 +64,12 @@ impl PairList {
 /// # Errors
 /// [`Failure::usage`], which names the file and the line.
 pub(super) fn records(path: &Path, options: &ReadOptions) -> Result<Vec<Record>, Failure> {
-    let bytes = read_file(path, options).map_err(|error| match error {
-        IoError::Read { source, .. } => Failure::usage(format!(
-            "cannot read {path:?}: {source}; it should be a table: CSV, JSON lines or Parquet"
-        )),
-        other => other.into(),
-    })?;
+    let bytes = files::read_bytes(path, options, "it should be a table: CSV, JSON lines or Parquet")?;
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let rows = if bytes.starts_with(b"PAR1") {
         // What it unpacks to is checked before any of it is.
         check_parquet(&bytes, options).map_err(|e| Failure::usage(format!("{path:?}: {e}")))?;
-        File::open(path).map_err(|e| e.to_string()).and_then(parquet_list::records)
+        parquet_list::records(bytes.into())
     } else if extension == "parquet" {
         Err("it is no Parquet file; was it written whole?".into())
     } else {

@@ -1,7 +1,5 @@
 //! Rows of a Parquet file as values: text, numbers and truth values.
 
-use std::fs::File;
-
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
     Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type,
@@ -9,6 +7,7 @@ use arrow_array::types::{
 };
 use arrow_array::{Array, ArrayRef};
 use arrow_schema::DataType;
+use bytes::Bytes;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::{Map, Value};
 
@@ -18,7 +17,7 @@ use super::pair::Record;
 ///
 /// # Errors
 /// What is wrong with the file; the column whose type is none of those.
-pub fn records(file: File) -> Result<Vec<Record>, String> {
+pub fn records(file: Bytes) -> Result<Vec<Record>, String> {
     let whole = |e: &dyn std::fmt::Display| format!("not a whole Parquet file ({e}); write it again");
     let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| whole(&e))?;
     let mut rows: Vec<Record> = Vec::new();

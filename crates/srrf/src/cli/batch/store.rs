@@ -1,9 +1,9 @@
 //! Files of results: read row by row in any format, written whole.
 
 use std::collections::BTreeSet;
-use std::fs::File;
 use std::path::Path;
 
+use bytes::Bytes;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
@@ -35,7 +35,7 @@ pub fn each_row(path: &Path, take: Take<'_>) -> Result<(), Failure> {
             let damaged =
                 |e: String| problem(("its end".to_owned(), format!("not a whole Parquet file ({e})")));
             check_parquet(&bytes, &ReadOptions::default()).map_err(|e| damaged(e.to_string()))?;
-            parquet_rows(File::open(path).map_err(|e| damaged(e.to_string()))?, take).map_err(problem)
+            parquet_rows(bytes.into(), take).map_err(problem)
         }
     }
 }
@@ -69,7 +69,7 @@ fn csv_rows(text: &[u8], take: Take<'_>) -> Result<(), (String, String)> {
     Ok(())
 }
 
-fn parquet_rows(file: File, take: Take<'_>) -> Result<(), (String, String)> {
+fn parquet_rows(file: Bytes, take: Take<'_>) -> Result<(), (String, String)> {
     let whole = |e: &dyn std::fmt::Display| ("its end".to_owned(), format!("not a whole Parquet file ({e})"));
     let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| whole(&e))?;
     let place = builder.schema().index_of("answer").map_err(|_| {
