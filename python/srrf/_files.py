@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from . import _srrf
 from ._arrays import Cloud, faces_of, points_of
 from ._errors import InputError, OptionError, ReadingWarning
-from ._options import whole
+from ._options import from_1, seed_of
 
 #: Units of length.
 Unit = Literal["um", "mm", "cm", "m", "km", "in", "ft", "us-ft"]
@@ -80,10 +80,10 @@ def read(
     """
     factor = _factor(unit, to)
     if surface_points is not None:
-        _from_1("surface_points", surface_points)
+        from_1("surface_points", surface_points)
         if vertices is not False:
             raise OptionError("surface_points says how many points are drawn from a surface; pass vertices=False with it")
-    seed = whole("seed", seed, 0, 2**64 - 1)
+    seed = seed_of(seed)
     path = os.fsdecode(path)
     reading = _reading(columns, array, layout, scan, topic, message, max_memory)
     points, said = _srrf.read(path, reading, vertices, surface_points, seed)
@@ -187,7 +187,7 @@ def _reading(
         columns = ",".join(str(column) for column in columns)
     for name, number in (("scan", scan), ("message", message), ("max_memory", max_memory)):
         if number is not None:
-            _from_1(name, number)
+            from_1(name, number)
     return {
         "columns": columns,
         "array": array,
@@ -197,7 +197,3 @@ def _reading(
         "message": message,
         "max_memory": max_memory,
     }
-
-
-def _from_1(name: str, number: int) -> None:
-    whole(name, number, 1, 2**63 - 1)

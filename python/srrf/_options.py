@@ -10,6 +10,9 @@ import numpy as np
 
 from ._errors import OptionError
 
+#: Most threads that can be asked for.
+_MOST_THREADS = 4096
+
 
 def whole(name: str, value: Any, least: int, most: int) -> int:
     """A whole number in these bounds. True and False are none."""
@@ -20,6 +23,21 @@ def whole(name: str, value: Any, least: int, most: int) -> int:
     if number is None or not least <= number <= most:
         raise OptionError(f"{name} is {value!r}: expected a whole number from {least} to {_short(most)}")
     return number
+
+
+def seed_of(value: Any) -> int:
+    """The seed of random draws."""
+    return whole("seed", value, 0, 2**64 - 1)
+
+
+def threads_of(value: Any) -> int | None:
+    """A number of threads; None for all cores."""
+    return None if value is None else whole("num_threads", value, 1, _MOST_THREADS)
+
+
+def from_1(name: str, value: Any) -> int:
+    """A whole number from 1."""
+    return whole(name, value, 1, 2**63 - 1)
 
 
 def real(name: str, value: Any) -> float:

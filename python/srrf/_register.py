@@ -11,15 +11,12 @@ from numpy.typing import NDArray
 from . import _srrf
 from ._arrays import Cloud, cloud_of, pose_of
 from ._errors import OptionError
-from ._options import real, text, truth, whole
+from ._options import real, seed_of, text, threads_of, truth
 from ._result import Result
 
 Method = Literal["auto", "srrf", "fpfh-ransac", "icp", "given"]
 Rotation = Literal["so3", "180", "45", 180, 45]
 Scale = Union[float, Literal["auto"], None]
-
-#: Most threads that can be asked for.
-MOST_THREADS = 4096
 
 
 class Options(TypedDict):
@@ -224,17 +221,18 @@ def register(
 
 def checked_options(
     *,
-    method: str = "auto",
-    rotation: str | int = "so3",
-    refine: bool = True,
-    weights: str | os.PathLike[str] | None = None,
-    device: str = "flex",
-    seed: int = 0,
-    abstain_below: float = 0.5,
-    vertices: bool = False,
-    scale: float | str | None = None,
-    num_threads: int | None = None,
+    method: str,
+    rotation: str | int,
+    refine: bool,
+    weights: str | os.PathLike[str] | None,
+    device: str,
+    seed: int,
+    abstain_below: float,
+    vertices: bool,
+    scale: float | str | None,
+    num_threads: int | None,
 ) -> Options:
+    """The options as the library takes them, each checked by its name."""
     if scale is not None and not isinstance(scale, str):
         if isinstance(scale, bool) or not isinstance(scale, (int, float, np.integer, np.floating)):
             raise OptionError(f'scale is {scale!r}: expected a number above 0, "auto", or None')
@@ -251,11 +249,11 @@ def checked_options(
         refine=truth("refine", refine),
         weights=named,
         device=text("device", device),
-        seed=whole("seed", seed, 0, 2**64 - 1),
+        seed=seed_of(seed),
         abstain_below=real("abstain_below", abstain_below),
         vertices=truth("vertices", vertices),
         scale=scale,
-        num_threads=None if num_threads is None else whole("num_threads", num_threads, 1, MOST_THREADS),
+        num_threads=threads_of(num_threads),
     )
 
 

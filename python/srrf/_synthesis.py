@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 from . import _srrf
 from ._arrays import Cloud, cloud_of
 from ._errors import InputTypeError, OptionError
-from ._register import MOST_THREADS
-from ._options import real, several, text, truth, whole
+from ._options import real, seed_of, several, text, threads_of, truth, whole
 
 Reading = Literal["paper", "modelnet40_c"]
 
-_SEEDS = 2**64 - 1
 #: More would not fit into the memory of most machines.
 _MOST_SHAPES = 1_000_000
 _MOST_POINTS = 1_000_000
@@ -97,7 +95,7 @@ def corrupt(
         cloud_of(points, None, "points"),
         text("kind", kind),
         _severity(severity),
-        whole("seed", seed, 0, _SEEDS),
+        seed_of(seed),
         text("reading", reading),
         truth("vertices", vertices),
     )
@@ -291,7 +289,7 @@ def pairs(
         clean=truth("clean", clean),
         data=None if data is None else os.fsdecode(data),
         split=text("split", split),
-        seed=whole("seed", seed, 0, _SEEDS),
+        seed=seed_of(seed),
         points=whole("points", points, 1, _MOST_POINTS),
         rotation_deg=None if isinstance(rotation, str) else real("rotation", rotation),
         translation=real("translation", translation),
@@ -302,7 +300,7 @@ def pairs(
         crop=None if crop is None else real("crop", crop),
         dcp_poses=truth("dcp_poses", dcp_poses),
         spread=truth("spread", spread),
-        num_threads=None if num_threads is None else whole("num_threads", num_threads, 1, MOST_THREADS),
+        num_threads=threads_of(num_threads),
     )
 
 

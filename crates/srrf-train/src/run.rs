@@ -51,6 +51,7 @@ struct Training<'a, C: Trained> {
     updater: Updater,
     progress: RunProgress,
     log: Log,
+    window: LossWindow,
     clock: SessionClock,
 }
 
@@ -142,6 +143,7 @@ impl<'a, C: Trained> Training<'a, C> {
         let updater = Updater::new(optimizer, &model);
         let log = Log::open(&options.folder, progress.step)
             .map_err(|source| TrainError::Io { path: options.folder.clone(), source })?;
+        let window = LossWindow::of_saved(&progress.window);
         let clock = SessionClock::new(&progress);
         Ok(Self {
             config,
@@ -156,6 +158,7 @@ impl<'a, C: Trained> Training<'a, C> {
             updater,
             progress,
             log,
+            window,
             clock,
         })
     }
@@ -168,7 +171,6 @@ impl<'a, C: Trained> Training<'a, C> {
         let (first, steps) = (run.progress.step, run.plan.steps());
         let end = options.until_step.unwrap_or(usize::MAX).min(steps);
         let bar = progress_bar(steps, first);
-        let mut window = LossWindow::of_saved(&run.progress.window);
         let mut saved = Instant::now();
         while run.progress.step < end && !stopped() {
             let step = run.progress.step;
@@ -178,9 +180,9 @@ impl<'a, C: Trained> Training<'a, C> {
             run.progress.step = step + 1;
 
             let epoch = run.plan.epochs(step + 1);
-            window.add(losses);
+            run.window.add(losses);
             if (step + 1).is_multiple_of(LOG_EVERY) {
-                let losses = window.mean();
+                let losses = run.window.mean();
                 let line = train_line(&stage.name, epoch, rate, &losses, config.optimizer.batch, &bar);
                 if bar.is_hidden() && (step + 1).is_multiple_of(SAY_EVERY) {
                     (options.say)(&format!("step {} of {steps}  {line}", step + 1));
@@ -188,7 +190,6 @@ impl<'a, C: Trained> Training<'a, C> {
                 bar.set_message(line);
                 run.log.train(step + 1, epoch, &stage.name, rate, &losses).map_err(|e| run.io(e))?;
             }
-            run.progress.window = window.saved();
             let last = step + 1 == steps;
             let due = (step + 1).is_multiple_of(run.plan.steps_in(config.keep.validate_epochs));
             if C::trains_poses(&stage.trains) && (due || last) {
@@ -269,6 +270,7 @@ impl<'a, C: Trained> Training<'a, C> {
     /// Checkpoint, last weights, picture. Once they are there, a run that this one replaced is removed.
     fn save(&mut self) -> Result<(), TrainError> {
         self.take_time();
+        self.progress.window = self.window.saved();
         let folder: &Path = &self.options.folder;
         checkpoint::save(folder, self.config, &self.model, self.updater.optimizer(), &self.progress)?;
         self.folder.forget()?;

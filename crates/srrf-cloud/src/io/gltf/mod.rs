@@ -106,25 +106,25 @@ impl CloudFormat for Gltf {
         }
         let mut bin: Vec<u8> = points.iter().flatten().flat_map(|&c| (c as f32).to_le_bytes()).collect();
         let count = points.len();
+        let mut arrays: Vec<(&str, &str, Vec<u8>)> = Vec::new();
+        if let Some(normals) = cloud.triple(NORMALS) {
+            let parts = |point| normals.map(|part| part.values.get(point).unwrap_or(0.0) as f32);
+            let bytes = (0..count).flat_map(parts).flat_map(f32::to_le_bytes).collect();
+            arrays.push(("NORMAL", "\"componentType\":5126,\"type\":\"VEC3\"", bytes));
+        }
+        if let Some((colours, _)) = cloud.colours() {
+            let bytes = colours.iter().flat_map(|&[r, g, b]| [r, g, b, 255]).collect();
+            let accessor = "\"componentType\":5121,\"normalized\":true,\"type\":\"VEC4\"";
+            arrays.push(("COLOR_0", accessor, bytes));
+        }
         let (mut names, mut accessors, mut views) = (String::new(), String::new(), String::new());
-        let mut add = |name: &str, accessor: &str, bytes: Vec<u8>, bin: &mut Vec<u8>| {
-            let number = 1 + names.matches(':').count();
+        for (number, (name, accessor, bytes)) in (1..).zip(arrays) {
             names += &format!(",\"{name}\":{number}");
             accessors += &format!(",{{\"bufferView\":{number},\"count\":{count},{accessor}}}");
             let (at, length) = (bin.len(), bytes.len());
             views +=
                 &format!(",{{\"buffer\":0,\"byteOffset\":{at},\"byteLength\":{length},\"target\":34962}}");
             bin.extend(bytes);
-        };
-        if let Some(normals) = cloud.triple(NORMALS) {
-            let parts = |point| normals.map(|part| part.values.get(point).unwrap_or(0.0) as f32);
-            let bytes = (0..count).flat_map(parts).flat_map(f32::to_le_bytes).collect();
-            add("NORMAL", "\"componentType\":5126,\"type\":\"VEC3\"", bytes, &mut bin);
-        }
-        if let Some((colours, _)) = cloud.colours() {
-            let bytes = colours.iter().flat_map(|&[r, g, b]| [r, g, b, 255]).collect();
-            let accessor = "\"componentType\":5121,\"normalized\":true,\"type\":\"VEC4\"";
-            add("COLOR_0", accessor, bytes, &mut bin);
         }
         let bound = |axis: usize, pick: fn(f32, f32) -> f32| {
             points.iter().map(|point| point[axis] as f32).reduce(pick).unwrap_or_default()
