@@ -49,6 +49,15 @@ impl Failure {
         Self { message: format!("{what}: {}", self.message), ..self }
     }
 
+    /// Outputs that could not be written once the work was done, if there are any; `left` says where the answer is all the
+    /// same. Exit code 1, whatever theirs are.
+    pub fn of_outputs(failures: Vec<Self>, left: Option<String>) -> Option<Self> {
+        let parts = failures.iter().map(|failure| failure.message.clone()).chain(left);
+        let message = parts.collect::<Vec<_>>().join("; ");
+        let first = failures.into_iter().next()?;
+        Some(Self { code: FAILED, message, source: first.source })
+    }
+
     /// A cloud, by its name, that cannot be used.
     pub fn cloud(name: &str, error: &CloudError) -> Self {
         Self::usage(format!("{name:?}: {error}{}", way_out(error))).because(error.clone())
@@ -132,6 +141,10 @@ mod tests {
         let full = IoError::Write { path: "b.ply".into(), source: std::io::Error::other("no space") };
         let failure = Failure::from(full);
         assert!(!failure.is_usage() && failure.to_string().contains("b.ply"));
+        let outputs = [Failure::usage("no room".into()), Failure::failed("no place".into())].into();
+        let outputs = Failure::of_outputs(outputs, Some("the pose is here".into())).unwrap();
+        assert_eq!(outputs.to_string(), "no room; no place; the pose is here");
+        assert!(!outputs.is_usage() && Failure::of_outputs(Vec::new(), Some("here".into())).is_none());
         let few = Failure::cloud("c.xyz", &CloudError::TooFew { have: 2, need: 3 }).to_string();
         assert!(few.starts_with("\"c.xyz\": the cloud has 2 points"), "{few}");
     }

@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use srrf_cloud::io::{
-    CloudFile, Contents, IoError, Kept, Note, Outgoing, ReadOptions, read_file, write_atomically,
-    write_outgoing, write_outgoing_to,
+    CloudFile, Contents, IoError, Kept, Note, Outgoing, ReadOptions, check_format, check_moved_points,
+    read_file, write_atomically, write_outgoing, write_outgoing_to,
 };
 use srrf_cloud::{CloudError, PointCloud, Rigid, Solid};
 
@@ -221,6 +221,34 @@ pub fn write_moved(path: &Path, file: &CloudFile, pose: &Rigid) -> Result<Kept, 
         () if is_special(path) => file.write_transformed_to(&mut open(path)?, None, pose),
         () => file.write_transformed(path, pose),
     }?)
+}
+
+/// Checks, before any work is done, that [`write_moved`] can write a copy of `file` that lies on the points of `target`
+/// (which may be none).
+///
+/// # Errors
+/// [`Failure::usage`], which names the file and what can be written instead.
+pub fn check_moved(path: &Path, file: &CloudFile, target: &[[f64; 3]]) -> Result<(), Failure> {
+    let own = is_stream(path) || is_special(path);
+    let checked =
+        if own { file.check_transformed_to(None, target) } else { file.check_transformed(path, target) };
+    checked.map_err(Failure::input)
+}
+
+/// As [`check_moved`], of [`write_points`]: points that will lie on those of `target`, or points of which nothing is known
+/// yet.
+///
+/// # Errors
+/// As [`check_moved`].
+pub fn check_points(path: &Path, points: Option<&[[f64; 3]]>, target: &[[f64; 3]]) -> Result<(), Failure> {
+    if is_stream(path) || is_special(path) {
+        return Ok(());
+    }
+    let checked = match points {
+        Some(points) => check_moved_points(path, points, target),
+        None => check_format(path),
+    };
+    checked.map_err(Failure::input)
 }
 
 fn open(path: &Path) -> Result<File, IoError> {

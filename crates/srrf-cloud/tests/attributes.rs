@@ -264,3 +264,21 @@ fn las_and_laz_are_the_same_records() {
     assert_eq!(std::fs::read(path("b.laz")).unwrap(), std::fs::read(path("d.laz")).unwrap());
     assert!(CloudFile::open(&path("b.laz")).unwrap().points().unwrap().len() == 3);
 }
+
+/// A column beside x, y and z may have one of their names: each name is there once in what is written.
+#[test]
+fn names_are_there_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let from = folder.path().join("a.csv");
+    std::fs::write(&from, "X,Y,Z,x_2,Intensity,intensity\n1,2,3,4,5,6\n7,8,9,10,11,12\n").unwrap();
+    let options = ReadOptions { columns: Some("4,2,3".parse().unwrap()), ..ReadOptions::default() };
+    for name in ["b.npy", "b.npz", "b.ply", "b.parquet", "b.vtp"] {
+        let to = folder.path().join(name);
+        let motion = Rigid { translation: [100.0, 0.0, 0.0].into(), ..Rigid::identity() };
+        CloudFile::open_with(&from, options.clone()).unwrap().write_transformed(&to, &motion).unwrap();
+        assert_eq!(open(&to).points().unwrap(), [[104.0, 2.0, 3.0], [110.0, 8.0, 9.0]], "{name}");
+        assert_eq!(values(&to, "x_2"), Some(vec![1.0, 7.0]), "{name}");
+        assert_eq!(values(&to, "intensity"), Some(vec![5.0, 11.0]), "{name}");
+        assert_eq!(values(&to, "intensity_2"), Some(vec![6.0, 12.0]), "{name}");
+    }
+}

@@ -303,3 +303,51 @@ fn switches_that_say_nothing_are_refused() {
         3
     );
 }
+
+/// Text in UTF-16, as PowerShell and Notepad write it, and in UTF-32; with its mark and without.
+#[test]
+fn text_of_two_and_of_four_bytes_a_character() {
+    let points = cloud(12);
+    let rows: String = points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n")).collect();
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex 12\nproperty double x\nproperty double y\nproperty double z\nend_header\n{rows}"
+    );
+    let vertices: String = rows.lines().map(|line| format!("v {line}\n")).collect();
+    let files = [
+        ("a.xyz", rows.clone()),
+        ("a.csv", csv("x,y,z", |_, [x, y, z]| format!("{x},{y},{z}"))),
+        ("a.pts", format!("12\n{rows}")),
+        ("a.off", format!("OFF\n12 0 0\n{rows}")),
+        ("a.obj", vertices),
+        ("a.ply", ply),
+        ("without-extension", rows.clone()),
+    ];
+    let encodings: [fn(&str) -> Vec<u8>; 4] = [
+        |text| text.encode_utf16().flat_map(u16::to_le_bytes).collect(),
+        |text| text.encode_utf16().flat_map(u16::to_be_bytes).collect(),
+        |text| text.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect(),
+        |text| text.chars().flat_map(|c| u32::from(c).to_be_bytes()).collect(),
+    ];
+    for (name, text) in files {
+        let expected = read(name, &text);
+        for encode in encodings {
+            for mark in ["", "\u{feff}"] {
+                let found = read(name, encode(&format!("{mark}{text}")));
+                assert_eq!(found.points, expected.points, "{name}");
+                let said = found.notes.last().unwrap().to_string();
+                assert!(
+                    said.starts_with("the text is in UTF-") && said.ends_with("copy of it is in UTF-8"),
+                    "{said}"
+                );
+            }
+        }
+    }
+    let mut damaged = encodings[0](&format!("\u{feff}{rows}"));
+    damaged.truncate(damaged.len() - 1);
+    refused("a.xyz", damaged, &["UTF-16 (little endian)", "damaged at character", "save it as UTF-8"]);
+}
+
+#[test]
+fn python_objects_are_called_by_their_name() {
+    refused("a.npy", npy("'|O'", "(2,)", b"\x80\x04"), &["Python objects", "of shape [points, 3]"]);
+}

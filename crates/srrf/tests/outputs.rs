@@ -163,3 +163,94 @@ fn left_overs_are_removed() {
     scene.srrf(&["corrupt", "source.ply", "-c", "cutout", "-o", "a.ply"]).ok();
     assert!(!scene.path(".writing-abc").exists() && scene.path("a.ply").exists());
 }
+
+/// Eight corners of a box that is no cube, and its faces, as STL.
+fn stl() -> String {
+    let corner = |i: usize| [i & 1, (i >> 1) & 1, i >> 2].map(|bit| bit as f64);
+    let faces = [[0, 1, 3], [0, 3, 2], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4], [2, 3, 7], [2, 7, 6]];
+    let mut text = "solid box\n".to_owned();
+    for face in faces {
+        text += "facet normal 0 0 1\nouter loop\n";
+        for [x, y, z] in face.map(corner) {
+            text += &format!("vertex {} {} {}\n", x, 2.0 * y, 3.0 * z);
+        }
+        text += "endloop\nendfacet\n";
+    }
+    text + "endsolid box\n"
+}
+
+const IDENTITY: &str = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+
+#[test]
+fn what_no_format_can_hold_is_refused_before_the_search() {
+    let scene = Scene::new(60);
+    scene.file("box.stl", stl());
+    scene.file("identity.txt", IDENTITY);
+    let pair = ["register", "source.ply", "target.ply", "--progress", "lines"];
+    for (save, words) in [
+        ("x.stl", "STL holds triangles, and a cloud has none; write .ply"),
+        ("x.ptx", "PTX holds the grid of a scanner"),
+        ("x.vts", "write .vtp"),
+        ("x.mcap", "recordings of ROS are not written"),
+        ("x.bin", "single precision"),
+        ("x.glb", "single precision"),
+    ] {
+        let done = scene.srrf(&[&pair[..], &["--save", save]].concat());
+        assert!(done.code == 2 && done.err.contains("--save: cannot write"), "{save}: {done:?}");
+        assert!(done.err.contains(words) && done.err.contains(save), "{save}: {done:?}");
+        assert!(!done.err.contains("search") && !scene.path(save).exists(), "{save}: {done:?}");
+    }
+    for (output, verb) in [("x.stl", "corrupt"), ("x.ptx", "corrupt")] {
+        let done = scene.srrf(&[verb, "source.ply", "-c", "cutout", "-o", output]);
+        assert!(done.code == 2 && done.err.contains("--output: cannot write"), "{done:?}");
+    }
+    // A mesh has a copy of its own format, as long as its size stays.
+    let mesh =
+        ["register", "box.stl", "box.stl", "--vertices", "--method", "given", "--initial", "identity.txt"];
+    scene.srrf(&[&mesh[..], &["--no-refine", "--save", "moved.stl"]].concat()).ok();
+    assert_eq!(scene.read("moved.stl"), stl());
+    let done = scene.srrf(&[&mesh[..], &["--scale", "2", "--save", "scaled.stl"]].concat());
+    assert!(done.code == 2 && done.err.contains("STL holds triangles"), "{done:?}");
+    // Files that say themselves that no copy can be moved.
+    let points: Vec<u8> =
+        [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 3.0].map(f32::to_le_bytes).concat();
+    scene.file("points.bin", points);
+    scene.file(
+        "a.gltf",
+        r#"{"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "mode": 0}]}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}], "buffers": [{"byteLength": 48, "uri": "points.bin"}]}"#,
+    );
+    let done = scene.srrf(&["register", "a.gltf", "a.gltf", "--save", "b.gltf"]);
+    assert!(done.code == 2 && done.err.contains("it refers to other files"), "{done:?}");
+    let done = scene.srrf(&["align", "a.gltf", "source.ply", "--moved", "copies"]);
+    let words = "--moved: no moved copy of \"a.gltf\" can be written: it refers to other files";
+    assert!(done.code == 2 && done.err.contains(words) && !scene.path("copies").exists(), "{done:?}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_fails_loses_no_answer() {
+    let scene = Scene::new(300);
+    let pair = ["register", "source.ply", "target.ply"];
+    let run = |more: &[&str]| scene.srrf(&[&pair[..], more].concat());
+    let done = run(&["--save", "/dev/full", "-o", "t.txt", "--html", "a.html", "--png", "/dev/full"]);
+    assert!(done.code == 1 && done.out.contains("verdict") && done.out.contains("wrote a.html"), "{done:?}");
+    assert_eq!(done.err.matches("cannot write \"/dev/full\"").count(), 2, "{done:?}");
+    assert!(scene.worst(&pose_of(&scene.read("t.txt"))) < 1e-2 && scene.path("a.html").exists());
+    assert!(!done.err.contains("the pose that was found"), "it is in a file: {done:?}");
+    let done = run(&["-q", "-o", "/dev/full"]);
+    let (_, pose) = done.err.trim().split_once("the pose that was found is ").unwrap();
+    let pose =
+        serde_json::json!({ "target_from_source": serde_json::from_str::<serde_json::Value>(pose).unwrap() });
+    assert!(done.code == 1 && scene.worst(&pose_of_json(&pose)) < 1e-2, "{done:?}");
+
+    let align = ["align", "source.ply", "target.ply"];
+    let done = scene.srrf(&[&align[..], &["-o", "poses.json", "--html", "/dev/full"]].concat());
+    assert!(done.code == 1 && done.out.contains("scans") && done.err.contains("/dev/full"), "{done:?}");
+    assert_eq!(json(&scene.path("poses.json"))["scans"].as_array().unwrap().len(), 2);
+    let done = scene.srrf(&[&align[..], &["-q", "--tum", "/dev/full", "--save", "m.ply"]].concat());
+    assert!(done.code == 1 && scene.path("m.ply").exists(), "{done:?}");
+    assert!(done.err.contains("# number of the scan") && done.err.contains("\n1 "), "{done:?}");
+}

@@ -5,7 +5,7 @@ mod identity;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use srrf_cloud::io::{format_names, is_cloud_file, place_of, remove_left_overs};
+use srrf_cloud::io::{check_format, format_names, is_cloud_file, place_of, remove_left_overs};
 
 use self::identity::{FileIdentity, existing};
 use crate::failure::Failure;
@@ -99,20 +99,24 @@ impl Places {
         self.output(flag, path.into(), |path| kind.check(flag, path))
     }
 
-    /// As [`writes`](Self::writes), for a cloud: its extension says the format.
+    /// As [`writes`](Self::writes), for a cloud of points: its extension says the format, which has room for them.
     ///
     /// # Errors
     /// As [`writes`](Self::writes).
     pub fn writes_cloud<'a>(self, flag: &str, path: impl Into<Option<&'a Path>>) -> Result<Self, Failure> {
         self.output(flag, path.into(), |path| {
-            if is_cloud_file(path) {
-                return Ok(());
-            }
-            Err(Failure::usage(format!(
-                "cannot write {path:?}: its extension names no format of clouds that this build has; use one of {}",
-                format_names().join(", ")
-            )))
+            is_named(path)?;
+            check_format(path).map_err(|error| Failure::input(error).at(flag))
         })
+    }
+
+    /// As [`writes`](Self::writes), for a copy of a file: its extension says the format, which may be one that the file
+    /// itself has to be of.
+    ///
+    /// # Errors
+    /// As [`writes`](Self::writes).
+    pub fn writes_copy<'a>(self, flag: &str, path: impl Into<Option<&'a Path>>) -> Result<Self, Failure> {
+        self.output(flag, path.into(), is_named)
     }
 
     /// As [`writes`](Self::writes); `check` looks at the name.
@@ -218,6 +222,17 @@ impl Places {
         folders.iter().for_each(|folder| remove_left_overs(folder));
         Ok(())
     }
+}
+
+/// Checks that the extension names a format of clouds.
+fn is_named(path: &Path) -> Result<(), Failure> {
+    if is_cloud_file(path) {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "cannot write {path:?}: its extension names no format of clouds that this build has; use one of {}",
+        format_names().join(", ")
+    )))
 }
 
 #[cfg(test)]

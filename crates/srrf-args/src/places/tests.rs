@@ -127,3 +127,24 @@ fn a_name_says_what_is_written() {
     let twice = Places::new().fills("--output", folder.0.path()).fills("--book", &*folder.path("sub/.."));
     assert!(twice.check().unwrap_err().to_string().contains("--book"));
 }
+
+#[test]
+fn a_cloud_has_a_format_with_room_for_it() {
+    let folder = Folder::new();
+    let cloud = |name: &str| {
+        Places::new().writes_cloud("--output", &*folder.path(name)).map(drop).map_err(|e| e.to_string())
+    };
+    assert_eq!((cloud("b.ply"), cloud("b.CSV")), (Ok(()), Ok(())));
+    for (name, words) in [
+        ("b.stl", "--output: cannot write"),
+        ("b.stl", "STL holds triangles, and a cloud has none; write .ply"),
+        ("b.ptx", "write .ply or .e57"),
+        ("b.vts", "write .vtp"),
+        ("b.foo", "names no format of clouds"),
+    ] {
+        let message = cloud(name).unwrap_err();
+        assert!(message.contains(words), "{name}: {message}");
+    }
+    assert!(Places::new().writes_copy("--save", &*folder.path("b.stl")).is_ok(), "of another STL");
+    assert!(Places::new().writes_copy("--save", &*folder.path("b.foo")).is_err());
+}

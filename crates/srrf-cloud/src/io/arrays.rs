@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 
-use super::file::read_file;
+use super::bytes::read_file;
 use super::npy::Array;
 use super::{FormatError, IoError, ReadOptions, npz};
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::encoding::TextEncoding;
 use super::options::PointLayout;
 use crate::Rigid;
 
@@ -124,6 +125,11 @@ pub enum Note {
         /// How many.
         points: usize,
     },
+    /// The text is not in UTF-8; a moved copy of it is.
+    Decoded {
+        /// What it is in.
+        encoding: TextEncoding,
+    },
     /// An array of other than two axes was read as a list of points.
     Flattened {
         /// Its shape.
@@ -141,6 +147,9 @@ impl fmt::Display for Note {
                 if *organised { " of the organised cloud" } else { "" }
             ),
             Self::Ignored { what } => write!(f, "passed over {what}"),
+            Self::Decoded { encoding } => {
+                write!(f, "the text is in {encoding}; a moved copy of it is in UTF-8")
+            }
             Self::ExtraBytes { bytes: 1 } => f.write_str("passed over 1 byte behind the end"),
             Self::ExtraBytes { bytes } => write!(f, "passed over {bytes} bytes behind the end"),
             Self::LayoutFound { layout } => write!(

@@ -1,14 +1,14 @@
 //! [`CloudFile`]: the bytes of a file or stream, and their format.
 
-use std::fs;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
+use super::bytes::{in_utf8, read_file, read_within};
 use super::choice::{detect, extension_of, format_of, named, scan_of};
 use super::outgoing::{NORMALS, fitted};
 use super::{
-    Attribute, CloudFormat, Contents, FORMATS, FormatError, IoError, PointLayout, ReadOptions, ReadSwitch,
-    ScanEntry, Taken, foreign,
+    Attribute, CloudFormat, Contents, FORMATS, FormatError, IoError, Note, PointLayout, ReadOptions,
+    ReadSwitch, ScanEntry, Taken, TextEncoding, foreign,
 };
 use super::{Kept, Outgoing, write_atomically};
 use crate::{CloudError, PointCloud, Rigid};
@@ -24,6 +24,8 @@ pub struct CloudFile {
     bytes: Vec<u8>,
     format: &'static dyn CloudFormat,
     options: ReadOptions,
+    /// What the text was in before it was made UTF-8.
+    encoding: Option<TextEncoding>,
 }
 
 impl CloudFile {
@@ -54,7 +56,7 @@ impl CloudFile {
         if let Err(left_out @ IoError::LeftOut { .. }) = known {
             return Err(left_out);
         }
-        let bytes = without_mark(read_file(path, &options)?);
+        let (bytes, encoding) = in_utf8(read_file(path, &options)?, path, &options)?;
         let format = match known {
             Ok(format) => format,
             Err(_) => detect(path, &bytes)?,
@@ -65,7 +67,7 @@ impl CloudFile {
         if sweep && options.layout.is_none() && bytes.len().is_multiple_of(PointLayout::NUSCENES.bytes()) {
             options.layout = Some(PointLayout::NUSCENES);
         }
-        Ok(Self { path: path.to_owned(), bytes, format, options })
+        Ok(Self { path: path.to_owned(), bytes, format, options, encoding })
     }
 
     /// Reads a stream to its end. `format` is the name or an extension of its format; without it the
@@ -91,18 +93,26 @@ impl CloudFile {
         }
         let format = format.map(named).transpose()?;
         let path = PathBuf::from("-");
-        let bytes = without_mark(read_within(reader, 0, &path, &options)?);
+        let (bytes, encoding) = in_utf8(read_within(reader, 0, &path, &options)?, &path, &options)?;
         let format = match format {
             Some(format) => format,
             None => detect(&path, &bytes)?,
         };
         Taken::of(format).pass_over(&mut options);
-        Ok(Self { path, bytes, format, options })
+        Ok(Self { path, bytes, format, options, encoding })
     }
 
     /// The name of the format.
     pub fn format(&self) -> &'static str {
         self.format.name()
+    }
+
+    pub(super) fn known_format(&self) -> &'static dyn CloudFormat {
+        self.format
+    }
+
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.bytes
     }
 
     /// The path, or `-` for a stream.
@@ -124,7 +134,8 @@ impl CloudFile {
         if self.bytes.is_empty() {
             return Err(empty());
         }
-        let contents = self.read().map_err(|source| self.error(source))?;
+        let mut contents = self.read().map_err(|source| self.error(source))?;
+        contents.notes.extend(self.encoding.map(|encoding| Note::Decoded { encoding }));
         if contents.points.is_empty() { Err(empty()) } else { Ok(contents) }
     }
 
@@ -158,7 +169,7 @@ impl CloudFile {
         self.format.attributes(&self.bytes, &self.options).map_err(|source| self.error(source))
     }
 
-    fn read(&self) -> Result<Contents, FormatError> {
+    pub(super) fn read(&self) -> Result<Contents, FormatError> {
         self.check_options()?;
         self.format.read(&self.bytes, &self.options)
     }
@@ -251,6 +262,7 @@ impl CloudFile {
         let contents = self.read()?;
         let mut attributes = self.format.attributes(&self.bytes, &self.options)?;
         turn_normals(&mut attributes, motion);
+        name_apart(&mut attributes);
         let points: Vec<[f64; 3]> =
             contents.points.iter().map(|&point| super::scan::moved(motion, point)).collect();
         // A text has no type; single precision is enough for it where that has the same decimals.
@@ -305,7 +317,7 @@ impl CloudFile {
     }
 
     /// Tells errors of the content from those of writing.
-    fn write_error(&self, output: &Path, source: io::Error) -> IoError {
+    pub(super) fn write_error(&self, output: &Path, source: io::Error) -> IoError {
         match source.downcast::<FormatError>() {
             Ok(source @ FormatError::Unwritable(_)) => {
                 IoError::Write { path: output.to_owned(), source: source.into() }
@@ -327,50 +339,6 @@ impl std::fmt::Debug for CloudFile {
     }
 }
 
-/// The mark of Unicode that editors put before a text goes where the format begins with a word of its own.
-fn without_mark(mut bytes: Vec<u8>) -> Vec<u8> {
-    const MARK: &[u8] = "\u{feff}".as_bytes();
-    let words = |format: &&&dyn CloudFormat| ["ply", "pcd", "off", "vtk"].contains(&format.name());
-    let marked = bytes
-        .strip_prefix(MARK)
-        .is_some_and(|rest| FORMATS.iter().filter(words).any(|format| format.recognises(rest)));
-    if marked {
-        bytes.drain(..MARK.len());
-    }
-    bytes
-}
-
-/// All bytes of a file of any kind, as far as they are allowed to take memory.
-///
-/// # Errors
-/// [`IoError::Read`]; [`IoError::Format`] where they are not.
-pub fn read_file(path: &Path, options: &ReadOptions) -> Result<Vec<u8>, IoError> {
-    let unread = |source| IoError::Read { path: path.to_owned(), source };
-    let file = fs::File::open(path).map_err(unread)?;
-    let length = file.metadata().map_err(unread)?.len();
-    read_within(file, length, path, options)
-}
-
-/// All bytes, about `length` of them, as far as they are allowed to take memory.
-fn read_within(
-    reader: impl Read,
-    length: u64,
-    path: &Path,
-    options: &ReadOptions,
-) -> Result<Vec<u8>, IoError> {
-    let check = |length: u64| {
-        let length = usize::try_from(length).unwrap_or(usize::MAX);
-        let checked = options.check_memory("the file alone", 0, length);
-        checked.map(|()| length).map_err(|source| IoError::Format { path: path.to_owned(), source })
-    };
-    let mut bytes = Vec::with_capacity(check(length)?.saturating_add(1));
-    if let Err(source) = reader.take(options.memory().saturating_add(1)).read_to_end(&mut bytes) {
-        return Err(IoError::Read { path: path.to_owned(), source });
-    }
-    check(bytes.len() as u64)?;
-    Ok(bytes)
-}
-
 /// Turns the attributes that are normals.
 fn turn_normals(attributes: &mut [Attribute], motion: &Rigid) {
     let place = |name: &str| attributes.iter().position(|attribute| attribute.name == name);
@@ -385,5 +353,20 @@ fn turn_normals(attributes: &mut [Attribute], motion: &Rigid) {
     for (axis, values) in [x, y, z].into_iter().zip(turned) {
         let kind = attributes[axis].values.scalar().for_turned();
         attributes[axis].values = kind.of_numbers(&values);
+    }
+}
+
+/// Gives attributes that have the name of a coordinate or of another one a name of their own: formats of named columns
+/// have each name once.
+fn name_apart(attributes: &mut [Attribute]) {
+    let mut taken: Vec<String> = ["x", "y", "z"].map(str::to_owned).to_vec();
+    for attribute in attributes {
+        let name = attribute.name.clone();
+        let mut number = 2;
+        while taken.contains(&attribute.name.to_ascii_lowercase()) {
+            attribute.name = format!("{name}_{number}");
+            number += 1;
+        }
+        taken.push(attribute.name.to_ascii_lowercase());
     }
 }

@@ -19,11 +19,13 @@ mod arrays;
 mod atomic;
 mod axes;
 mod bin;
+mod bytes;
 mod choice;
 mod columns;
 mod contents;
 #[cfg(feature = "e57")]
 mod e57;
+mod encoding;
 mod error;
 mod file;
 mod foreign;
@@ -48,6 +50,7 @@ mod ply;
 mod poses;
 mod pts;
 mod ptx;
+mod room;
 mod scalar;
 mod scan;
 mod scans;
@@ -60,15 +63,18 @@ mod width;
 
 pub use arrays::{ArrayError, NpzArrays, read_npy, read_npz};
 pub use atomic::{place_of, remove_left_overs, write_atomically};
+pub use bytes::read_file;
 pub use contents::{Attribute, AttributeValues, Contents, Note, ScanEntry};
+pub use encoding::{TextEncoding, as_utf8};
 pub use error::{FormatError, IoError};
-pub use file::{CloudFile, format_names, read_file};
+pub use file::{CloudFile, format_names};
 pub use npy::Array;
 pub use npz_writer::NpzWriter;
 pub use options::{ColumnName, OptionError, PointColumns, PointLayout, ReadOptions, ReadSwitch};
 pub use outgoing::{Kept, Outgoing, WhyDouble};
 #[cfg(feature = "parquet")]
 pub use parquet::check_parquet;
+pub use room::{Room, check_format, check_moved_points};
 pub use taken::Taken;
 pub use text::parse_point;
 
@@ -157,6 +163,35 @@ pub trait CloudFormat: Sync {
     /// Whether coordinates may be in single or in double precision.
     fn has_both_precisions(&self) -> bool {
         false
+    }
+
+    /// What clouds [`write_cloud`](Self::write_cloud) can write.
+    fn room(&self) -> Room {
+        Room::Anything
+    }
+
+    /// Checks points of a format that has [room for some](Room::SomePoints).
+    ///
+    /// # Errors
+    /// [`FormatError::Unwritable`].
+    fn check_points(&self, points: &[[f64; 3]]) -> Result<(), FormatError> {
+        let _ = points;
+        Ok(())
+    }
+
+    /// What moved points a copy of a file of the format `from` can hold, by [`rewrite`](Self::rewrite) or
+    /// [`rewrite_from`](Self::rewrite_from); `None` for the formats of which only the cloud is written anew.
+    ///
+    /// # Errors
+    /// [`FormatError::Unwritable`] for a file that cannot be copied with a motion.
+    fn check_rewrite(
+        &self,
+        from: &str,
+        bytes: &[u8],
+        options: &ReadOptions,
+    ) -> Option<Result<Room, FormatError>> {
+        let _ = (bytes, options);
+        (from == self.name()).then_some(Ok(Room::Anything))
     }
 
     /// Writes a cloud in the precision that it asks for, with the attributes that the format [keeps](Self::keeps).

@@ -28,20 +28,17 @@ fn count(text: &[u8]) -> Option<u64> {
     std::str::from_utf8(text).ok()?.parse().ok()
 }
 
-/// The scans of a file; a file without counts is one.
+/// The scans of a file; a file without counts is one. A number alone on a line is no point, so that it begins a scan even
+/// where the one before has more or fewer points than it announces.
 fn blocks(bytes: &[u8]) -> Vec<PtsScan> {
     let mut blocks: Vec<PtsScan> = Vec::new();
-    let mut left = 0;
     for line in ByteLines::new(bytes) {
-        let points = count(line.text).filter(|_| left == 0);
+        let points = count(line.text);
         if let Some(points) = points.filter(|_| !blocks.is_empty() || line.number == 1) {
             if let Some(last) = blocks.last_mut() {
                 last.place.end = line.start;
             }
             blocks.push(PtsScan { place: line.start..bytes.len(), lines: line.number - 1, points });
-            left = points;
-        } else if !line.text.trim_ascii().is_empty() {
-            left = left.saturating_sub(1);
         }
     }
     if blocks.is_empty() { vec![PtsScan { place: 0..bytes.len(), lines: 0, points: 0 }] } else { blocks }
@@ -205,6 +202,27 @@ mod tests {
         let short = TWO.replace("2 2 2 0 0 0 0\n", "");
         let error = Pts.read(short.as_bytes(), &ReadOptions::default().of_scan(2)).unwrap_err().to_string();
         assert!(error.contains("3 points announced, 2 found"), "{error}");
+    }
+
+    #[test]
+    fn a_count_that_is_one_off() {
+        let error = |text: &str, scan| {
+            let read = Pts.read(text.as_bytes(), &ReadOptions { scan, ..ReadOptions::default() });
+            read.unwrap_err().to_string()
+        };
+        assert!(error("3\n1 2 3\n4 5 6\n", None).contains("cut short: 3 points announced, 2 found"));
+        let more = error("1\n1 2 3\n4 5 6\n", None);
+        assert!(more.contains("announces 1 points, and 2 follow; put their number there"), "{more}");
+        // The scan behind it begins all the same.
+        for (count, words) in
+            [("3", "3 points announced, 2 found"), ("1", "announces 1 points, and 2 follow")]
+        {
+            let text = TWO.replacen('2', count, 1);
+            let first = error(&text, Some(1));
+            assert!(first.contains(words), "{first}");
+            let second = Pts.read(text.as_bytes(), &ReadOptions::default().of_scan(2)).unwrap().points;
+            assert_eq!(second, [[7.0, 8.0, 9.0], [1.0; 3], [2.0; 3]]);
+        }
     }
 
     #[test]

@@ -102,6 +102,8 @@ pub(super) fn number(word: &[u8]) -> Result<f64, String> {
     }
     let hint = match text.matches(',').count() {
         1 if text.replace(',', ".").parse::<f64>().is_ok() => "; write decimals with a point, not a comma",
+        _ if text.contains(char::is_whitespace) => "; it has no-break spaces in it, write plain ones",
+        _ if text.contains('\u{2212}') => "; its sign is the one of print, U+2212, write a hyphen",
         _ => "",
     };
     Err(format!("{} is not a number{hint}", quote(word)))
@@ -246,6 +248,10 @@ mod tests {
             number(b"1,5").unwrap_err(),
             "\"1,5\" is not a number; write decimals with a point, not a comma"
         );
+        assert!(
+            number("1\u{a0}2".as_bytes()).unwrap_err().ends_with("no-break spaces in it, write plain ones")
+        );
+        assert!(number("\u{2212}1.5".as_bytes()).unwrap_err().ends_with("U+2212, write a hyphen"));
         assert!(number(&[0xff; 999]).unwrap_err().len() < 200);
     }
 

@@ -6,13 +6,15 @@ use std::ops::Range;
 
 use super::scan::{ByteLines, Line, Splice, moved, number, quote, turned, words};
 use super::single::check_single;
-use super::{CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
+use super::{CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, Room};
 use crate::Rigid;
 
 /// Bytes before the triangles of a binary file, and of a triangle: a normal, three corners and two
 /// bytes of attributes.
 const HEADER: usize = 84;
 const RECORD: usize = 50;
+
+const NO_POINTS: &str = "STL holds triangles, and a cloud has none; write .ply or .obj";
 
 /// STL files. The points are the corners of the triangles, each only once however many triangles
 /// share it, in the order in which they first appear. A moved copy keeps triangles, names and
@@ -61,9 +63,26 @@ impl CloudFormat for Stl {
         Ok(Contents { points: mesh.points, faces: mesh.faces, single: binary, notes, ..Contents::default() })
     }
 
+    fn room(&self) -> Room {
+        Room::Nothing(NO_POINTS)
+    }
+
+    fn check_points(&self, points: &[[f64; 3]]) -> Result<(), FormatError> {
+        check_single(points, "binary STL")
+    }
+
+    fn check_rewrite(
+        &self,
+        from: &str,
+        bytes: &[u8],
+        _options: &ReadOptions,
+    ) -> Option<Result<Room, FormatError>> {
+        let room = |(binary, _)| if binary { Room::SomePoints } else { Room::Anything };
+        (from == self.name()).then(|| is_binary(bytes).map(room))
+    }
+
     fn write_cloud(&self, _cloud: &Outgoing<'_>, _out: &mut dyn Write) -> io::Result<()> {
-        let problem = "STL holds triangles, and a cloud has none; write .ply or .obj";
-        Err(FormatError::Unwritable(problem.into()).into())
+        Err(Room::refusal(NO_POINTS).into())
     }
 
     fn rewrite(
@@ -81,7 +100,7 @@ impl CloudFormat for Stl {
             text_rows(bytes, |_, places, kind, old| splice.numbers(places, old, change(kind)(motion, old)))?;
             return splice.finish();
         }
-        check_single(&moved_points, "binary STL")?;
+        self.check_points(&moved_points)?;
         for (index, record) in triangles(bytes).iter().enumerate() {
             for part in 0..4 {
                 let old = vector(record, part);

@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::choice::{detect, format_of, scan_of};
-use super::{CloudFormat, FormatError, ReadOptions, ReadSwitch};
+use super::{CloudFormat, FormatError, ReadOptions, ReadSwitch, as_utf8};
 
 /// Bytes of a file by which its format is known where its name does not say it.
 const BEGINNING: u64 = 1 << 16;
@@ -36,7 +36,9 @@ impl Taken {
         }
         let mut bytes = Vec::new();
         File::open(path).ok()?.take(BEGINNING).read_to_end(&mut bytes).ok()?;
-        detect(path, &bytes).ok().map(Self::of)
+        // Cut anywhere, so that its last character may be none.
+        let text = as_utf8(&bytes[..bytes.len() / 4 * 4]).ok()?;
+        detect(path, &text).ok().map(Self::of)
     }
 
     /// The flags of the options, in words.

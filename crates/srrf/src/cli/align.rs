@@ -1,6 +1,6 @@
 //! `srrf align`: many scans in, one map out.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -10,7 +10,7 @@ use srrf::{Options, Registrar};
 use srrf_align::{AlignError, AlignOptions, AlignProgress, AlignStage, Map};
 use srrf_args::flags::{Common, value};
 use srrf_args::reading::ReadFlags;
-use srrf_args::words::{count, counted};
+use srrf_args::words::counted;
 use srrf_args::{Failure, Output, OutputKind, OutputLock, Places, Progress, files, interrupt};
 use srrf_cloud::io::is_cloud_file;
 
@@ -171,7 +171,14 @@ pub fn run(args: &AlignArgs) -> Result<ExitCode, Failure> {
     if out != Output::Quiet {
         out.say(&summary(&map, &scans, begun.elapsed().as_secs_f64()));
     }
-    written?.iter().for_each(|line| out.say(line));
+    written.lines.iter().for_each(|line| out.say(line));
+    if !written.failed.is_empty() && !written.holds_poses {
+        // Better beside the errors than lost.
+        Output::Aside.say(align_poses::to_tum(&map, &scans).trim_end());
+    }
+    if let Some(failure) = Failure::of_outputs(written.failed, None) {
+        return Err(failure);
+    }
     let doubtful = map.components.len() > 1 || map.scans.iter().any(|s| s.abstain);
     Ok(if doubtful { ExitCode::from(ABSTAINED) } else { ExitCode::SUCCESS })
 }
@@ -234,68 +241,66 @@ impl AlignArgs {
                     places.reads("a scan", &*file).writes_into("--moved", folder, &name.to_string_lossy());
             }
             places.check()?;
+            align_moved::check(&scans)?;
         }
         Ok(scans)
     }
 
-    /// Writes what was asked for; says what was written.
-    fn write(
-        &self,
-        map: &Map,
-        scans: &ScanFiles,
-        registrar: &Registrar,
-        seconds: f64,
-    ) -> Result<Vec<String>, Failure> {
-        let mut lines = Vec::new();
-        if let Some(path) = &self.output {
+    /// Writes what was asked for; says what was written. One that fails does not keep the others from being written.
+    fn write(&self, map: &Map, scans: &ScanFiles, registrar: &Registrar, seconds: f64) -> Written {
+        let mut written = Written::default();
+        let mut put =
+            |path: Option<&PathBuf>, holds_poses: bool, write: &dyn Fn(&Path) -> Result<String, Failure>| {
+                let Some(path) = path else { return };
+                match write(path) {
+                    Ok(what) => {
+                        written.holds_poses |= holds_poses;
+                        written.lines.push(wrote(path, &what));
+                    }
+                    Err(failure) => written.failed.push(failure),
+                }
+            };
+        put(self.output.as_ref(), true, &|path| {
             let json = align_poses::to_json(map, scans, &registrar.options().to_string(), seconds);
             files::write(path, format!("{json:#}\n").as_bytes())?;
-            lines.push(wrote(path, "all poses and figures"));
-        }
-        if let Some(path) = &self.tum {
+            Ok("all poses and figures".to_owned())
+        });
+        put(self.tum.as_ref(), true, &|path| {
             files::write(path, align_poses::to_tum(map, scans).as_bytes())?;
-            lines.push(wrote(path, "the poses of the largest map, as TUM"));
-        }
-        if let Some(path) = &self.merge.save {
-            let merged = merge(map, scans, &self.merge, path)?;
-            let [points, of] = merged.points;
-            let [with, without] = &merged.attributes;
-            let mut what = format!(
-                "{} of {} points of the largest map, with the number of their scan",
-                count(points),
-                count(of)
-            );
-            if !with.is_empty() {
-                what += &format!(" and {}", with.join(", "));
-            }
-            if !without.is_empty() {
-                what += &format!("; without {}, which not all its scans have", without.join(", "));
-            }
-            lines.push(wrote(path, &what));
-        }
-        if let Some(folder) = &self.moved {
+            Ok("the poses of the largest map, as TUM".to_owned())
+        });
+        put(self.kitti.as_ref(), true, &|path| {
+            files::write(path, align_poses::to_kitti(map)?.as_bytes())?;
+            Ok("the poses, as KITTI".to_owned())
+        });
+        put(self.merge.save.as_ref(), false, &|path| Ok(merge(map, scans, &self.merge, path)?.words()));
+        put(self.moved.as_ref(), false, &|folder| {
             let copies = align_moved::write(map, scans, folder)?;
             let mut what =
                 format!("{}, moved into the frame of the largest map", counted(copies.written, "file"));
             if !copies.unmoved.is_empty() {
                 what += &format!("; not in it and not moved: {}", shortened(&copies.unmoved));
             }
-            lines.push(wrote(folder, &what));
-        }
-        if let Some(path) = &self.html {
+            Ok(what)
+        });
+        put(self.html.as_ref(), false, &|path| {
             files::write(path, align_page::page(map, scans)?.as_bytes())?;
-            lines.push(wrote(path, "open it in a browser"));
-        }
-        // Last, since several maps are refused.
-        if let Some(path) = &self.kitti {
-            files::write(path, align_poses::to_kitti(map)?.as_bytes())?;
-            lines.push(wrote(path, "the poses, as KITTI"));
-        }
-        Ok(lines)
+            Ok("open it in a browser".to_owned())
+        });
+        written
     }
 }
 
-fn wrote(path: &std::path::Path, what: &str) -> String {
+/// What became of the outputs.
+#[derive(Debug, Default)]
+struct Written {
+    lines: Vec<String>,
+    failed: Vec<Failure>,
+    /// Whether the poses are in one of them.
+    holds_poses: bool,
+}
+
+fn wrote(path: &Path, what: &str) -> String {
     let name = if files::is_stream(path) { "standard output".to_owned() } else { path.display().to_string() };
     format!("wrote {name}: {what}")
 }

@@ -7,6 +7,7 @@ use clap::Args;
 use srrf_align::{Map, Scans};
 use srrf_args::Failure;
 use srrf_args::files;
+use srrf_args::words::count;
 use srrf_cloud::io::{Attribute, AttributeValues, Outgoing, write_outgoing_to};
 use srrf_cloud::{PointCloud, point_spacing};
 
@@ -73,6 +74,25 @@ pub struct Merged {
     pub points: [usize; 2],
     /// Names of attributes that came along, and of those that not all scans have.
     pub attributes: [Vec<String>; 2],
+}
+
+impl Merged {
+    /// In words, for people.
+    pub fn words(&self) -> String {
+        let ([points, of], [with, without]) = (self.points, &self.attributes);
+        let mut what = format!(
+            "{} of {} points of the largest map, with the number of their scan",
+            count(points),
+            count(of)
+        );
+        if !with.is_empty() {
+            what += &format!(" and {}", with.join(", "));
+        }
+        if !without.is_empty() {
+            what += &format!("; without {}, which not all its scans have", without.join(", "));
+        }
+        what
+    }
 }
 
 /// Writes the largest map to `path`, with what all its scans have besides: colours, intensities, normals.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use srrf_align::Map;
 use srrf_args::{Failure, files};
 use srrf_cloud::Rigid;
-use srrf_cloud::io::{CloudFile, ReadOptions};
+use srrf_cloud::io::{CloudFile, IoError, ReadOptions};
 
 use super::align_scans::ScanFiles;
 
@@ -26,6 +26,24 @@ pub fn names(scans: &ScanFiles) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
         }
     }
     Ok(names)
+}
+
+/// Checks, before any work is done, that a moved copy of each file can be written.
+///
+/// # Errors
+/// [`Failure::usage`] for a file of a format, or of a kind, that is not written.
+pub fn check(scans: &ScanFiles) -> Result<(), Failure> {
+    for file in names(scans)?.into_values() {
+        let read = CloudFile::open_with(&file, scans.options().clone())?;
+        read.check_transformed_to(None, &[]).map_err(|error| {
+            let why = match &error {
+                IoError::Write { source, .. } => source.to_string(),
+                other => other.to_string(),
+            };
+            Failure::usage(format!("--moved: no moved copy of {file:?} can be written: {why}")).because(error)
+        })?;
+    }
+    Ok(())
 }
 
 /// What was written, and the scans that are not in the largest map: those stay as they were in a file of several.
@@ -72,10 +90,6 @@ fn copy(
     let [first, rest @ ..] = motions else { return Ok(()) };
     let with = |scan: Option<usize>| scan.map_or_else(|| options.clone(), |scan| options.of_scan(scan));
     let read = CloudFile::open_with(file, with(first.0))?;
-    if rest.is_empty() {
-        files::write_moved(to, &read, &first.1)?;
-        return Ok(());
-    }
     let format = read.format();
     let mut bytes = Vec::new();
     read.write_transformed_to(&mut bytes, None, &first.1)?;

@@ -122,6 +122,7 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
         rayon::join(|| args.read(), || Registrar::new(args.scale.options(args.method.options())));
     let (mut source, mut target) = inputs?;
     args.scale.apply(&mut source)?;
+    args.check_save(&source, &target)?;
     let (one_unit, seed) = (args.scale.is_one_unit(), args.method.seed.seed);
     let surfaces = args.surface.draw(&mut source, &mut target, one_unit, seed)?;
     let registrar = registrar.map_err(unusable)?;
@@ -138,15 +139,18 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
     outcome.warnings.extend(initial.and_then(|pose| looks_inverted(&pose, &source.cloud, &target.cloud)));
 
     let written = if outcome.abstain && args.require_answer {
-        vec!["--require-answer: nothing was written".to_owned()]
+        Written { lines: vec!["--require-answer: nothing was written".to_owned()], ..Written::default() }
     } else {
-        args.write(&outcome, &source, &target, initial.as_ref(), &progress)?
+        args.write(&outcome, &source, &target, initial.as_ref(), &progress)
     };
     progress.clear();
     if out != Output::Quiet {
         guess.iter().for_each(|guess| out.say(&described("--initial", guess)));
         out.say(&summary::text(&outcome, &source, &target, begun.elapsed().as_secs_f64()));
-        written.iter().for_each(|line| out.say(line));
+        written.lines.iter().for_each(|line| out.say(line));
+    }
+    if let Some(failure) = written.failure(&outcome.target_from_source) {
+        return Err(failure);
     }
     Ok(if outcome.abstain { ExitCode::from(ABSTAINED) } else { ExitCode::SUCCESS })
 }
@@ -164,7 +168,7 @@ impl RegisterArgs {
         let places = self
             .writing
             .among(places, "--output", self.output.as_deref())?
-            .writes_cloud("--save", self.save.as_deref())?
+            .writes_copy("--save", self.save.as_deref())?
             .writes("--json", self.json.as_deref(), OutputKind::JSON)?
             .writes("--html", self.html.as_deref(), OutputKind::PAGE)?
             .writes("--png", self.png.as_deref(), OutputKind::PNG)?
@@ -180,7 +184,19 @@ impl RegisterArgs {
         Ok((source, target))
     }
 
-    /// Writes what was asked for; says what was written.
+    /// Checks that the moved source can be written once its pose is known.
+    fn check_save(&self, source: &Input, target: &Input) -> Result<(), Failure> {
+        let Some(path) = &self.save else { return Ok(()) };
+        let (points, target) = (source.cloud.points(), target.cloud.points());
+        let checked = match self.scale.changes_size() {
+            false => files::check_moved(path, &source.file, target),
+            true if self.scale.is_one_unit() => files::check_points(path, Some(points), target),
+            true => files::check_points(path, None, target),
+        };
+        checked.map_err(|failure| failure.at("--save"))
+    }
+
+    /// Writes what was asked for; says what was written. One that fails does not keep the others from being written.
     fn write(
         &self,
         outcome: &Outcome,
@@ -188,59 +204,84 @@ impl RegisterArgs {
         target: &Input,
         initial: Option<&Rigid>,
         progress: &Progress,
-    ) -> Result<Vec<String>, Failure> {
-        let pose = &outcome.target_from_source;
-        let mut lines = Vec::new();
-        let begin = |path: &Path| progress.step(format!("writing {path:?}"));
-        if let Some(path) = &self.output {
-            begin(path);
-            let note = PoseNote { abstain: outcome.abstain, probability: Some(outcome.probability.get()) };
-            self.writing.write(path, pose, &note)?;
-            let what = if outcome.abstain { "the pose, with the word abstain" } else { "the pose" };
-            lines.push(wrote(path, what));
-        }
-        if let Some(path) = &self.save {
-            begin(path);
-            let whole = outcome.scale.is_none_or(|scale| scale.factor == 1.0);
-            let (what, kept) = if whole {
-                ("the moved source", files::write_moved(path, &source.file, pose)?)
-            } else {
-                let factor = outcome.scale.map_or(1.0, |scale| scale.factor);
-                (
-                    "the points of the source, scaled and moved",
-                    files::write_scaled(path, source, factor, pose)?,
-                )
+    ) -> Written {
+        let mut written = Written::default();
+        let mut put =
+            |path: Option<&PathBuf>, holds_pose: bool, write: &dyn Fn(&Path) -> Result<String, Failure>| {
+                let Some(path) = path else { return };
+                progress.step(format!("writing {path:?}"));
+                match write(path) {
+                    Ok(what) => {
+                        written.holds_pose |= holds_pose;
+                        written.lines.push(wrote(path, &what));
+                    }
+                    Err(failure) => written.failed.push(failure),
+                }
             };
-            lines.push(wrote(path, &kept_words(what, &kept, whole)));
-        }
-        if let Some(path) = &self.json {
-            begin(path);
+        put(self.output.as_ref(), true, &|path| self.write_pose(path, outcome));
+        put(self.json.as_ref(), true, &|path| {
             let found = answer(outcome, &source.name, &target.name, [source.dropped, target.dropped]);
             let text = serde_json::to_string_pretty(&found).map_err(Failure::other)?;
             files::write(path, format!("{text}\n").as_bytes())?;
-            lines.push(wrote(path, "all figures"));
-        }
+            Ok("all figures".to_owned())
+        });
+        put(self.save.as_ref(), false, &|path| save(path, outcome, source));
         let shown = self.html.is_some() || self.png.is_some();
         let values = if shown { ShownValues::of_pair(source, target) } else { Default::default() };
-        if let Some(path) = &self.html {
-            begin(path);
-            let pair = page::of_outcome(outcome, source, target, &values, initial, &self.page);
-            files::write(path, page::html(pair, source, target).as_bytes())?;
-            lines.push(wrote(path, "open it in a browser"));
-        }
-        if let Some(path) = &self.png {
-            begin(path);
-            let pair = page::of_outcome(outcome, source, target, &values, initial, &self.page);
-            files::write(path, &page::png(&pair)?)?;
-            lines.push(wrote(path, "a picture: before, after, and the distances that are left"));
-        }
-        if let Some(path) = &self.rrd {
-            begin(path);
+        let pair = || page::of_outcome(outcome, source, target, &values, initial, &self.page);
+        put(self.html.as_ref(), false, &|path| {
+            files::write(path, page::html(pair(), source, target).as_bytes())?;
+            Ok("open it in a browser".to_owned())
+        });
+        put(self.png.as_ref(), false, &|path| {
+            files::write(path, &page::png(&pair())?)?;
+            Ok("a picture: before, after, and the distances that are left".to_owned())
+        });
+        put(self.rrd.as_ref(), false, &|path| {
             rrd::write(path, outcome, source, target)?;
-            lines.push(wrote(path, "open it with `rerun`"));
-        }
-        Ok(lines)
+            Ok("open it with `rerun`".to_owned())
+        });
+        written
     }
+
+    fn write_pose(&self, path: &Path, outcome: &Outcome) -> Result<String, Failure> {
+        let note = PoseNote { abstain: outcome.abstain, probability: Some(outcome.probability.get()) };
+        self.writing.write(path, &outcome.target_from_source, &note)?;
+        Ok(if outcome.abstain { "the pose, with the word abstain" } else { "the pose" }.to_owned())
+    }
+}
+
+/// What became of the outputs.
+#[derive(Debug, Default)]
+struct Written {
+    lines: Vec<String>,
+    failed: Vec<Failure>,
+    /// Whether the pose is in one of them.
+    holds_pose: bool,
+}
+
+impl Written {
+    /// The failure of the outputs that could not be written, with the pose where no file has it.
+    fn failure(self, pose: &Rigid) -> Option<Failure> {
+        let rows = pose.to_matrix4();
+        let row = |i: usize| format!("{:?}", [0, 1, 2, 3].map(|j| rows[(i, j)]));
+        let matrix = [0, 1, 2, 3].map(row).join(", ");
+        let left = (!self.holds_pose).then(|| format!("the pose that was found is [{matrix}]"));
+        Failure::of_outputs(self.failed, left)
+    }
+}
+
+/// Writes the source, moved and maybe scaled.
+fn save(path: &Path, outcome: &Outcome, source: &Input) -> Result<String, Failure> {
+    let pose = &outcome.target_from_source;
+    let factor = outcome.scale.map_or(1.0, |scale| scale.factor);
+    let whole = factor == 1.0;
+    let (what, kept) = if whole {
+        ("the moved source", files::write_moved(path, &source.file, pose)?)
+    } else {
+        ("the points of the source, scaled and moved", files::write_scaled(path, source, factor, pose)?)
+    };
+    Ok(kept_words(what, &kept, whole))
 }
 
 /// What was written, and what of the original it has.

@@ -69,6 +69,11 @@ impl ScaleArgs {
         Options { check_scale: self.given().is_none() && self.scale.is_none(), ..options }
     }
 
+    /// Whether the source will have another size: its points alone can be written then.
+    pub fn changes_size(&self) -> bool {
+        self.scale == Some(ScaleChoice::Auto) || self.given().is_some_and(|given| given.factor != 1.0)
+    }
+
     /// Multiplies the source by the factor that was given.
     ///
     /// # Errors
@@ -155,5 +160,8 @@ mod tests {
         assert!(!args.options(Options::default()).check_scale);
         let none = ScaleArgs { source_unit: None, target_unit: None, scale: None };
         assert!(none.options(Options::default()).check_scale && none.given().is_none());
+        let sizes = [ScaleChoice::Auto, ScaleChoice::Factor(2.0), ScaleChoice::Factor(1.0)]
+            .map(|scale| ScaleArgs { scale: Some(scale), ..none }.changes_size());
+        assert_eq!((sizes, args.changes_size(), none.changes_size()), ([true, true, false], true, false));
     }
 }

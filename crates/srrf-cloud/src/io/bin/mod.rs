@@ -9,7 +9,7 @@ use super::scalar::Scalar;
 use super::scan::{Splice, moved};
 use super::single::check_single;
 use super::{
-    Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, PointLayout, ReadOptions, ReadSwitch,
+    Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, PointLayout, ReadOptions, ReadSwitch, Room,
 };
 use crate::Rigid;
 
@@ -63,8 +63,26 @@ impl CloudFormat for Kitti {
         attribute.name == INTENSITY
     }
 
+    fn room(&self) -> Room {
+        Room::SomePoints
+    }
+
+    fn check_points(&self, points: &[[f64; 3]]) -> Result<(), FormatError> {
+        check_single(points, "KITTI .bin")
+    }
+
+    fn check_rewrite(
+        &self,
+        from: &str,
+        bytes: &[u8],
+        options: &ReadOptions,
+    ) -> Option<Result<Room, FormatError>> {
+        let room = |layout: PointLayout| if layout.double { Room::Anything } else { Room::SomePoints };
+        (from == self.name()).then(|| layout(bytes, options).map(room))
+    }
+
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
-        check_single(cloud.points, "KITTI .bin")?;
+        self.check_points(cloud.points)?;
         let intensity = cloud.attribute(INTENSITY);
         cloud.points.iter().enumerate().try_for_each(|(index, point)| {
             point.iter().try_for_each(|&c| out.write_all(&(c as f32).to_le_bytes()))?;
@@ -85,7 +103,7 @@ impl CloudFormat for Kitti {
         let old = points(bytes, layout);
         let new: Vec<[f64; 3]> = old.iter().map(|&point| moved(motion, point)).collect();
         if !layout.double {
-            check_single(&new, "KITTI .bin")?;
+            self.check_points(&new)?;
         }
         let mut splice = Splice::new(bytes, out);
         let size = if layout.double { 8 } else { 4 };

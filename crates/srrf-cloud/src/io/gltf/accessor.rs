@@ -60,14 +60,14 @@ impl GltfDocument<'_> {
         };
         let (kind, components) = (scalar(component), components(kind));
         let count = usize::try_from(accessor.count.0).unwrap_or(usize::MAX);
-        let Some(view) = accessor.buffer_view else {
-            return Err(match self.compression() {
-                Some(name) => compressed(name),
-                None => content(format!("accessor {number} has no data")),
-            });
-        };
         let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
-        let mut values = self.rows(view, offset, count, kind, components)?;
+        let mut values = match (accessor.buffer_view, self.compression()) {
+            (Some(view), _) => self.rows(view, offset, count, kind, components)?,
+            (None, Some(name)) => return Err(compressed(name)),
+            // Without data, an accessor is zeros but for the items that it replaces.
+            (None, None) if accessor.sparse.is_some() => self.zeros(number, count, components)?,
+            (None, None) => return Err(content(format!("accessor {number} has no data"))),
+        };
         if let Some(sparse) = &accessor.sparse {
             let count = usize::try_from(sparse.count.0).unwrap_or(usize::MAX);
             let Checked::Valid(indices) = sparse.indices.component_type else {
@@ -102,6 +102,16 @@ impl GltfDocument<'_> {
         // Integers of 8 and 16 bits fit too, unless they stand for fractions.
         let single = kind == Scalar::F32 || (!accessor.normalized && kind.size() <= 2);
         Ok(AccessorNumbers { values, components, single })
+    }
+
+    /// As many zeros as there are bytes in all buffers, at most: the count of an accessor without data is no more than a
+    /// word.
+    fn zeros(&self, number: usize, count: usize, components: usize) -> Result<Vec<f64>, FormatError> {
+        let bytes: usize = self.buffers.iter().map(|buffer| buffer.len()).sum();
+        match count.checked_mul(components) {
+            Some(size) if size <= bytes.max(1 << 16) => Ok(vec![0.0; size]),
+            _ => Err(content(format!("accessor {number} has {count} items and no data"))),
+        }
     }
 
     /// `count` rows of a view.

@@ -6,9 +6,9 @@ use std::path::{Component, Path, PathBuf};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use gltf::binary::Glb;
-use gltf::json::{Root, deserialize};
+use gltf::json::{Root, Value, deserialize};
 
-use super::super::file::read_file;
+use super::super::bytes::read_file;
 use super::super::scan::quote;
 use super::super::{FormatError, IoError, ReadOptions};
 
@@ -19,6 +19,13 @@ pub(super) struct GltfParts<'a> {
     pub bin: Option<Cow<'a, [u8]>>,
     /// Whether it is a `.glb`.
     pub glb: bool,
+}
+
+impl GltfParts<'_> {
+    /// The JSON, with all that it holds.
+    pub fn value(&self) -> Result<Value, FormatError> {
+        deserialize::from_slice(&self.json).map_err(|e| content(format!("the JSON is damaged: {e}")))
+    }
 }
 
 /// The file, taken apart.

@@ -16,7 +16,9 @@ use gltf::binary::{Glb, Header};
 
 use super::outgoing::{COLOURS, NORMALS};
 use super::single::check_single;
-use super::{Attribute, AttributeValues, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
+use super::{
+    Attribute, AttributeValues, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, Room,
+};
 use crate::Rigid;
 
 /// glTF files. The points of all meshes of the scene are read, each placed by its nodes; triangles,
@@ -93,17 +95,39 @@ impl CloudFormat for Gltf {
         of(COLOURS) || of(NORMALS)
     }
 
-    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
-        let points = cloud.points;
+    fn room(&self) -> Room {
+        Room::SomePoints
+    }
+
+    fn check_points(&self, points: &[[f64; 3]]) -> Result<(), FormatError> {
         check_single(points, "glTF")?;
         if points.is_empty() || !points.iter().flatten().all(|c| c.is_finite()) {
-            let problem = "glTF holds neither empty clouds nor NaN; write .ply";
-            return Err(FormatError::Unwritable(problem.into()).into());
+            return Err(Room::refusal("glTF holds neither empty clouds nor NaN; write .ply"));
         }
         if points.len() > (u32::MAX as usize - (1 << 16)) / 28 {
             let problem = format!("a .glb holds at most 4 GB, not {} points; write .ply", points.len());
-            return Err(FormatError::Unwritable(problem).into());
+            return Err(FormatError::Unwritable(problem));
         }
+        Ok(())
+    }
+
+    fn check_rewrite(
+        &self,
+        from: &str,
+        bytes: &[u8],
+        options: &ReadOptions,
+    ) -> Option<Result<Room, FormatError>> {
+        let check = || {
+            let parts = document::parts(bytes)?;
+            moved::check(&parts.value()?, &document::document(&parts, options)?)?;
+            Ok(Room::Anything)
+        };
+        (from == self.name()).then(check)
+    }
+
+    fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
+        let points = cloud.points;
+        self.check_points(points)?;
         let mut bin: Vec<u8> = points.iter().flatten().flat_map(|&c| (c as f32).to_le_bytes()).collect();
         let count = points.len();
         let mut arrays: Vec<(&str, &str, Vec<u8>)> = Vec::new();

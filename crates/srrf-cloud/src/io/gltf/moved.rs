@@ -3,9 +3,9 @@
 use std::io::{self, Write};
 
 use gltf::binary::{Glb, Header};
-use gltf::json::{Value, deserialize, serialize};
+use gltf::json::{Value, serialize};
 
-use super::super::FormatError;
+use super::super::{FormatError, Room};
 use super::document::{GltfDocument, GltfParts};
 use crate::Rigid;
 
@@ -13,32 +13,39 @@ fn content(problem: impl Into<String>) -> FormatError {
     FormatError::Content(problem.into())
 }
 
+/// Checks that a copy of the file can be moved.
+///
+/// # Errors
+/// [`FormatError::Unwritable`] where the file refers to other files, which the copy would look for beside itself, or holds
+/// several scenes.
+pub(super) fn check(json: &Value, document: &GltfDocument) -> Result<(), FormatError> {
+    let named = |list: &str| {
+        let items = json.get(list).and_then(Value::as_array).into_iter().flatten();
+        items.filter_map(|item| item.get("uri").and_then(Value::as_str)).any(|uri| !uri.starts_with("data:"))
+    };
+    if named("buffers") || named("images") {
+        return Err(Room::refusal(
+            "it refers to other files, which a copy would look for beside itself; save as .glb first, or write .ply",
+        ));
+    }
+    if document.root.scenes.len() > 1 {
+        return Err(Room::refusal("it holds several scenes; save one of them, or write .ply"));
+    }
+    Ok(())
+}
+
 /// Writes the file anew with the node; all else stays.
 ///
 /// # Errors
-/// Those of `out`, and [`FormatError::Unwritable`] inside where the file refers to other files, which the copy would
-/// look for beside itself.
+/// Those of `out`, and inside them those of [`check`].
 pub(super) fn write(
     parts: &GltfParts,
     document: &GltfDocument,
     motion: &Rigid,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    let damaged = |e: gltf::json::Error| content(format!("the JSON is damaged: {e}"));
-    let mut json: Value = deserialize::from_slice(&parts.json).map_err(damaged)?;
-    let named = |list: &str| {
-        let items = json.get(list).and_then(Value::as_array).into_iter().flatten();
-        items.filter_map(|item| item.get("uri").and_then(Value::as_str)).any(|uri| !uri.starts_with("data:"))
-    };
-    if named("buffers") || named("images") {
-        let problem = "it refers to other files, which a copy would look for beside itself; save as .glb first, or \
-                       write .ply";
-        return Err(FormatError::Unwritable(problem.into()).into());
-    }
-    if document.root.scenes.len() > 1 {
-        let problem = "it holds several scenes; save one of them, or write .ply";
-        return Err(FormatError::Unwritable(problem.into()).into());
-    }
+    let mut json = parts.value()?;
+    check(&json, document)?;
     let top = document.top_nodes()?;
     let rigid = motion.rotation;
     let t = motion.translation;
@@ -68,7 +75,7 @@ pub(super) fn write(
             json["scene"] = 0.into();
         }
     }
-    let text = serialize::to_vec(&json).map_err(damaged)?;
+    let text = serialize::to_vec(&json).map_err(|e| content(format!("the JSON is damaged: {e}")))?;
     if parts.glb {
         let header = Header { magic: *b"glTF", version: 2, length: 0 };
         let glb = Glb { header, json: text.into(), bin: parts.bin.clone() };

@@ -137,6 +137,17 @@ fn sparse_and_quantised_numbers() {
     let mut expected = SQUARE;
     (expected[1], expected[2]) = ([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]);
     assert_eq!(contents(&glb(&sparse)).unwrap().points, expected);
+    // An accessor without data is zeros but for what it replaces.
+    let bare = sparse.replacen(
+        "{\"bufferView\":0,\"componentType\":5126,\"count\":4",
+        "{\"componentType\":5126,\"count\":4",
+        1,
+    );
+    let mut expected = [[0.0; 3]; 4];
+    (expected[1], expected[2]) = ([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]);
+    assert_eq!(contents(&glb(&bare)).unwrap().points, expected);
+    let many = bare.replacen("\"count\":4", "\"count\":4000000000", 1);
+    assert!(contents(&glb(&many)).unwrap_err().to_string().contains("items and no data"));
     let outside = sparse.replace("\"byteOffset\":114,\"byteLength\":8", "\"byteOffset\":96,\"byteLength\":8");
     assert!(contents(&glb(&outside)).unwrap_err().to_string().contains("replaces item"));
     // Colours as points: bytes that stand for fractions, and bytes that do not.

@@ -4,7 +4,7 @@ use std::io;
 
 use laz::{LazItemRecordBuilder, LazVlr};
 
-use super::super::{FormatError, ReadOptions};
+use super::super::{FormatError, ReadOptions, Room};
 use super::header::{LasHeader, put_word};
 use super::laz_record::guarded;
 use super::{records, zipped};
@@ -12,17 +12,29 @@ use super::{records, zipped};
 /// Bytes of a point of each format, without extra bytes.
 const LENGTHS: [usize; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
+/// Checks that the points can be packed as LAZ, or unpacked.
+///
+/// # Errors
+/// [`FormatError::Unwritable`].
+pub(super) fn check(header: &LasHeader, bytes: &[u8], pack: bool) -> Result<(), FormatError> {
+    if header.zipped == pack {
+        return Ok(());
+    }
+    if header.waveforms_inside(bytes) {
+        return Err(Room::refusal(
+            "a file with waveforms inside stays LAS or LAZ as it is; write the extension that it has",
+        ));
+    }
+    if pack { new_vlr(bytes[104] & 0x3f, header.record_length).map(drop) } else { Ok(()) }
+}
+
 /// The file with its points packed as LAZ, or not; all else as it is.
 pub(super) fn repacked(bytes: &[u8], options: &ReadOptions, pack: bool) -> io::Result<Vec<u8>> {
     let header = LasHeader::parse(bytes)?;
     if header.zipped == pack {
         return Ok(bytes.to_vec());
     }
-    if header.waveforms_inside(bytes) {
-        let problem =
-            "a file with waveforms inside stays LAS or LAZ as it is; write the extension that it has";
-        return Err(FormatError::Unwritable(problem.into()).into());
-    }
+    check(&header, bytes, pack)?;
     let records = records(&header, bytes, options)?;
     let mut copy = bytes[..header.length()].to_vec();
     let mut behind = header.length();

@@ -13,7 +13,7 @@ use std::io::{self, Write};
 
 use self::header::{LasAxis, LasHeader};
 use super::scan::moved;
-use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, Room};
 use crate::Rigid;
 
 /// LAS and LAZ files.
@@ -55,6 +55,32 @@ impl CloudFormat for LasFormat {
 
     fn keeps(&self, attribute: &Attribute, cloud: &Outgoing<'_>) -> bool {
         attributes::keeps(attribute, cloud)
+    }
+
+    fn room(&self) -> Room {
+        Room::SomePoints
+    }
+
+    fn check_points(&self, points: &[[f64; 3]]) -> Result<(), FormatError> {
+        axes_for(points, None).map(drop)
+    }
+
+    fn check_rewrite(
+        &self,
+        from: &str,
+        bytes: &[u8],
+        options: &ReadOptions,
+    ) -> Option<Result<Room, FormatError>> {
+        let _ = options;
+        let check = || {
+            let header = LasHeader::parse(bytes)?;
+            match from == self.name() {
+                true => check_movable(&header, bytes)?,
+                false => convert::check(&header, bytes, self.zipped)?,
+            }
+            Ok(Room::SomePoints)
+        };
+        ["las", "laz"].contains(&from).then(check)
     }
 
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {
@@ -186,6 +212,13 @@ fn put_points(points: &[[f64; 3]], axes: &[LasAxis; 3], length: usize, records: 
     }
 }
 
+fn check_movable(header: &LasHeader, bytes: &[u8]) -> Result<(), FormatError> {
+    if header.zipped && header.waveforms_inside(bytes) {
+        return Err(Room::refusal("LAZ with waveforms inside cannot be moved; unpack it to .las first"));
+    }
+    Ok(())
+}
+
 fn rewritten(bytes: &[u8], options: &ReadOptions, motion: &Rigid) -> io::Result<Vec<u8>> {
     let header = LasHeader::parse(bytes)?;
     let mut records = records(&header, bytes, options)?.into_owned();
@@ -205,10 +238,7 @@ fn rewritten(bytes: &[u8], options: &ReadOptions, motion: &Rigid) -> io::Result<
         copy.extend(&bytes[header.points_at + records.len()..]);
         return Ok(copy);
     }
-    if header.waveforms_inside(bytes) {
-        let problem = "LAZ with waveforms inside cannot be moved; unpack it to .las first";
-        return Err(FormatError::Unwritable(problem.into()).into());
-    }
+    check_movable(&header, bytes)?;
     let vlr = header.laz(bytes)?;
     zipped::compress(&mut copy, vlr, &records)?;
     if let Some(tail) = header.extended_records(bytes) {

@@ -10,7 +10,9 @@ use std::io::{self, Write};
 use self::cloud::Message;
 use self::messages::{Topic, each_cloud};
 use super::scan::quote;
-use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ReadSwitch, ScanEntry};
+use super::{
+    Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ReadSwitch, Room, ScanEntry,
+};
 use crate::Rigid;
 
 /// MCAP files of ROS 2 (CDR) and ROS 1. The cloud is one message of one topic; where there are
@@ -108,9 +110,7 @@ fn with_message<T>(
     found.ok_or_else(|| FormatError::truncated(format!("message {wanted}"), number.to_string()))
 }
 
-fn not_written() -> io::Error {
-    FormatError::Unwritable("recordings of ROS are not written; write .pcd or .ply".into()).into()
-}
+const NOT_WRITTEN: &str = "recordings of ROS are not written; write .pcd or .ply";
 
 impl CloudFormat for Mcap {
     fn name(&self) -> &'static str {
@@ -156,8 +156,21 @@ impl CloudFormat for Mcap {
         with_message(bytes, options, |message| Ok(message.attributes()))
     }
 
+    fn room(&self) -> Room {
+        Room::Nothing(NOT_WRITTEN)
+    }
+
+    fn check_rewrite(
+        &self,
+        _from: &str,
+        _bytes: &[u8],
+        _options: &ReadOptions,
+    ) -> Option<Result<Room, FormatError>> {
+        None
+    }
+
     fn write_cloud(&self, _cloud: &Outgoing<'_>, _out: &mut dyn Write) -> io::Result<()> {
-        Err(not_written())
+        Err(Room::refusal(NOT_WRITTEN).into())
     }
 
     fn rewrite(
@@ -167,7 +180,7 @@ impl CloudFormat for Mcap {
         _motion: &Rigid,
         _out: &mut dyn Write,
     ) -> io::Result<()> {
-        Err(not_written())
+        Err(Room::refusal(NOT_WRITTEN).into())
     }
 }
 

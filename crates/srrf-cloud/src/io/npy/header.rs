@@ -25,6 +25,13 @@ impl NpyKind {
             b"u2" => Scalar::U16,
             b"u4" => Scalar::U32,
             b"u8" => Scalar::U64,
+            b"O" => {
+                return Err(FormatError::Content(
+                    "it holds Python objects (lists, dictionaries, arrays of several lengths), which may run code when they \
+                     are opened; save each cloud as an array of numbers of its own, of shape [points, 3]"
+                        .into(),
+                ));
+            }
             _ => {
                 return Err(FormatError::Content(format!(
                     "cannot read numbers of type {}; save the array as float32, float64 or integers",

@@ -19,8 +19,8 @@ pub(super) enum Place {
     Columns([usize; 3]),
     /// One column of lists of three numbers.
     List(usize),
-    /// One column of structures with three numbers.
-    Struct(usize, [usize; 3]),
+    /// One column of structures, the fields of structures inside it down to the one with three numbers, and those.
+    Struct(usize, Vec<usize>, [usize; 3]),
 }
 
 impl Place {
@@ -28,8 +28,16 @@ impl Place {
     pub fn roots(&self) -> Vec<usize> {
         match self {
             Self::Columns(axes) => axes.to_vec(),
-            Self::List(column) | Self::Struct(column, _) => vec![*column],
+            Self::List(column) | Self::Struct(column, ..) => vec![*column],
         }
+    }
+}
+
+/// The type of the values, which a dictionary holds once each.
+fn values_of(kind: &DataType) -> &DataType {
+    match kind {
+        DataType::Dictionary(_, values) => values,
+        other => other,
     }
 }
 
@@ -48,7 +56,7 @@ const LISTS: [&str; 10] = [
 ];
 
 fn is_number(kind: &DataType) -> bool {
-    kind.is_numeric()
+    values_of(kind).is_numeric()
 }
 
 fn is_list(kind: &DataType) -> bool {
@@ -59,14 +67,25 @@ fn is_list(kind: &DataType) -> bool {
     }
 }
 
-fn struct_axes(kind: &DataType) -> Option<[usize; 3]> {
-    let DataType::Struct(fields) = kind else { return None };
+/// Structures in structures that are looked into.
+const DEPTH: usize = 8;
+
+/// All structures with three numbers x, y and z in a type: the fields on the way to them, and those.
+fn struct_axes(kind: &DataType, depth: usize) -> Vec<(Vec<usize>, [usize; 3])> {
+    let DataType::Struct(fields) = kind else { return Vec::new() };
     let find = |name: &str| {
         fields
             .iter()
             .position(|field| field.name().eq_ignore_ascii_case(name) && is_number(field.data_type()))
     };
-    Some([find("x")?, find("y")?, find("z")?])
+    if let (Some(x), Some(y), Some(z)) = (find("x"), find("y"), find("z")) {
+        return vec![(Vec::new(), [x, y, z])];
+    }
+    let inside = |(index, field): (usize, &Arc<Field>)| {
+        let below = if depth > 0 { struct_axes(field.data_type(), depth - 1) } else { Vec::new() };
+        below.into_iter().map(move |(way, axes)| ([vec![index], way].concat(), axes))
+    };
+    fields.iter().enumerate().flat_map(inside).collect()
 }
 
 fn unclear(problem: String) -> FormatError {
@@ -115,10 +134,11 @@ pub(super) fn find(schema: &Schema, columns: Option<&PointColumns>) -> Result<Pl
     if let Some(list) = lists.next() {
         return Ok(Place::List(list));
     }
-    let mut structs =
-        fields.iter().enumerate().filter_map(|(i, field)| Some((i, struct_axes(field.data_type())?)));
+    let mut structs = fields.iter().enumerate().flat_map(|(column, field)| {
+        struct_axes(field.data_type(), DEPTH).into_iter().map(move |(way, axes)| (column, way, axes))
+    });
     match (structs.next(), structs.next()) {
-        (Some((column, axes)), None) => Ok(Place::Struct(column, axes)),
+        (Some((column, way, axes)), None) => Ok(Place::Struct(column, way, axes)),
         _ if axes::find(&numbers) == axes::Axes::Degrees => {
             Err(axes::choose(&numbers, None).err().unwrap_or_else(|| unclear("degrees".into())))
         }
@@ -128,7 +148,7 @@ pub(super) fn find(schema: &Schema, columns: Option<&PointColumns>) -> Result<Pl
 
 /// Whether single precision holds every number of a type.
 pub(super) fn is_single(kind: &DataType) -> bool {
-    match kind {
+    match values_of(kind) {
         DataType::Float16
         | DataType::Float32
         | DataType::Int8
@@ -169,6 +189,19 @@ pub(super) fn numbers(array: &dyn Array) -> Result<Vec<f64>, FormatError> {
         DataType::Decimal32(_, scale) => cast!(Decimal32Type, v => decimal(i128::from(v), *scale)),
         DataType::Decimal64(_, scale) => cast!(Decimal64Type, v => decimal(i128::from(v), *scale)),
         DataType::Decimal128(_, scale) => cast!(Decimal128Type, v => decimal(v, *scale)),
+        DataType::Dictionary(..) => {
+            let array = array.as_any_dictionary();
+            let values = numbers(array.values())?;
+            if values.is_empty() {
+                return Ok(vec![f64::NAN; array.len()]);
+            }
+            // A key that is missing stands for any value of the list.
+            let keys = array.normalized_keys();
+            let value = |(row, key): (usize, usize)| {
+                if array.is_null(row) { f64::NAN } else { values.get(key).copied().unwrap_or(f64::NAN) }
+            };
+            keys.into_iter().enumerate().map(value).collect()
+        }
         other => {
             return Err(FormatError::Content(format!("a column of the type {other}, which is no number")));
         }
@@ -202,12 +235,17 @@ pub(super) fn points(
             };
             triples([column(axes[0])?, column(axes[1])?, column(axes[2])?], points)
         }
-        Place::Struct(_, axes) => {
+        Place::Struct(_, way, axes) => {
             let array = columns.first().ok_or_else(missing)?;
-            let fields = array.as_struct_opt().ok_or_else(missing)?;
+            let mut fields = array.as_struct_opt().ok_or_else(missing)?;
+            let mut empty: Vec<bool> = (0..fields.len()).map(|row| fields.is_null(row)).collect();
+            for &step in way {
+                fields = fields.columns().get(step).and_then(|a| a.as_struct_opt()).ok_or_else(missing)?;
+                empty.iter_mut().enumerate().for_each(|(row, empty)| *empty |= fields.is_null(row));
+            }
             let before = points.len();
             triples(axes.map(|axis| fields.column(axis)), points)?;
-            for row in (0..fields.len()).filter(|&row| fields.is_null(row)) {
+            for (row, _) in empty.iter().enumerate().filter(|(_, empty)| **empty) {
                 points[before + row] = [f64::NAN; 3];
             }
             Ok(())

@@ -13,7 +13,7 @@ use arrow_schema::DataType;
 use self::columns::Place;
 use self::table::Table;
 use super::scalar::Scalar;
-use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ReadSwitch};
+use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ReadSwitch, Room};
 use crate::Rigid;
 
 /// Parquet files. The points are the columns x, y and z of any type of numbers, or a column of lists
@@ -106,6 +106,20 @@ impl CloudFormat for Parquet {
 
     fn has_both_precisions(&self) -> bool {
         true
+    }
+
+    fn check_rewrite(
+        &self,
+        from: &str,
+        bytes: &[u8],
+        options: &ReadOptions,
+    ) -> Option<Result<Room, FormatError>> {
+        let check = || {
+            let table = Table::open(bytes, options)?;
+            let place = columns::find(table.metadata.schema(), options.columns.as_ref())?;
+            write::moved_columns(&place).map(|_| Room::Anything)
+        };
+        (from == self.name()).then(check)
     }
 
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {

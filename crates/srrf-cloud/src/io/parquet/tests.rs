@@ -235,3 +235,28 @@ fn attributes_are_columns() {
         assert_eq!(found[2].name, "label");
     }
 }
+
+#[test]
+fn dictionaries_and_structures_in_structures() {
+    use arrow_array::{DictionaryArray, Int32Array};
+    let keys = || Int32Array::from(vec![Some(1), Some(0), None]);
+    let coded = |values: &[f64]| -> ArrayRef { Arc::new(DictionaryArray::new(keys(), doubles(values))) };
+    let bytes = table(vec![("x", coded(&[1.5, 2.5])), ("y", coded(&[-1.0, 3.0])), ("z", coded(&[7.0, 8.0]))]);
+    let found = points(&bytes).unwrap();
+    assert_eq!(found[..2], [[2.5, 3.0, 8.0], [1.5, -1.0, 7.0]]);
+    assert!(found[2].iter().all(|c| c.is_nan()), "a key that is missing");
+
+    let field = |name: &str, array: &ArrayRef| Arc::new(Field::new(name, array.data_type().clone(), true));
+    let place = ["x", "y", "z"].map(|name| (name, doubles(&[1.0, 2.0])));
+    let inner: ArrayRef = Arc::new(StructArray::from(
+        place.iter().map(|(n, a)| (field(n, a), Arc::clone(a))).collect::<Vec<_>>(),
+    ));
+    let outer: ArrayRef = Arc::new(StructArray::from(vec![
+        (field("time", &doubles(&[5.0, 6.0])), doubles(&[5.0, 6.0])),
+        (field("position", &inner), Arc::clone(&inner)),
+    ]));
+    let bytes = table(vec![("pose", Arc::clone(&outer))]);
+    assert_eq!(points(&bytes).unwrap(), [[1.0; 3], [2.0; 3]]);
+    let two = table(vec![("pose", outer), ("other", inner)]);
+    assert!(points(&two).unwrap_err().to_string().contains("[\"pose\", \"other\"]"));
+}

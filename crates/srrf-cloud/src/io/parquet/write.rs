@@ -16,7 +16,7 @@ use parquet::file::properties::WriterProperties;
 use super::super::outgoing::stays_single;
 use super::super::scalar::Scalar;
 use super::super::scan::{moved, turned};
-use super::super::{AttributeValues, FormatError, Outgoing, ReadOptions};
+use super::super::{AttributeValues, FormatError, Outgoing, ReadOptions, Room};
 use super::columns::{Place, numbers};
 use super::table::{Table, guarded};
 use crate::Rigid;
@@ -101,6 +101,19 @@ impl Change {
     }
 }
 
+/// The columns that a moved copy changes.
+///
+/// # Errors
+/// [`FormatError::Unwritable`] for points in lists.
+pub(super) fn moved_columns(place: &Place) -> Result<[usize; 3], FormatError> {
+    match place {
+        Place::Columns(axes) => Ok(*axes),
+        _ => Err(Room::refusal(
+            "a moved copy of points in lists is not supported; write .ply, or save columns x, y and z",
+        )),
+    }
+}
+
 /// The file anew with `points` moved and the columns nx, ny and nz turned; all other columns stay.
 pub(super) fn rewritten(
     table: &Table,
@@ -109,11 +122,7 @@ pub(super) fn rewritten(
     points: &[[f64; 3]],
     motion: &Rigid,
 ) -> Result<Vec<u8>, FormatError> {
-    let Place::Columns(axes) = *place else {
-        let problem =
-            "a moved copy of points in lists is not supported; write .ply, or save columns x, y and z";
-        return Err(FormatError::Unwritable(problem.into()));
-    };
+    let axes = moved_columns(place)?;
     let old = table.metadata.schema();
     let kind = |column: usize| old.field(column).data_type().clone();
     let new: Vec<[f64; 3]> = points.iter().map(|&point| moved(motion, point)).collect();

@@ -8,7 +8,8 @@ use std::io::{self, Write};
 use self::parse::{PtxHeader, PtxRow, parse};
 use super::scan::{Splice, put_number};
 use super::{
-    Attribute, AttributeValues, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, ScanEntry,
+    Attribute, AttributeValues, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, Room,
+    ScanEntry,
 };
 use crate::Rigid;
 
@@ -16,6 +17,8 @@ use crate::Rigid;
 /// the file, or those of one scan, in the same coordinates; beams that did not come back (zeros) are
 /// NaN. A moved copy changes only the matrices in the headers of the scans. Not written.
 pub(super) struct Ptx;
+
+const NO_GRID: &str = "PTX holds the grid of a scanner, which other clouds do not have; write .ply or .e57";
 
 /// What is read of a file.
 #[derive(Default)]
@@ -95,9 +98,12 @@ impl CloudFormat for Ptx {
         Ok(attributes)
     }
 
+    fn room(&self) -> Room {
+        Room::Nothing(NO_GRID)
+    }
+
     fn write_cloud(&self, _cloud: &Outgoing<'_>, _out: &mut dyn Write) -> io::Result<()> {
-        let problem = "PTX holds the grid of a scanner, which other clouds do not have; write .ply or .e57";
-        Err(FormatError::Unwritable(problem.into()).into())
+        Err(Room::refusal(NO_GRID).into())
     }
 
     fn rewrite(

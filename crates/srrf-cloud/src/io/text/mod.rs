@@ -78,7 +78,11 @@ impl CloudFormat for Text {
             ));
         }
         match parsed.announced {
-            Some(count) if points.len() != count => {
+            Some(count) if points.len() > count => Err(FormatError::Content(format!(
+                "the first line announces {count} points, and {} follow; put their number there, or take the line away",
+                points.len()
+            ))),
+            Some(count) if points.len() < count => {
                 Err(FormatError::truncated(format!("{count} points"), points.len().to_string()))
             }
             _ => {

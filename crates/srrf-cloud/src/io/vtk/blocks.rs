@@ -11,7 +11,7 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use flate2::read::ZlibDecoder;
 
 use super::super::scalar::Scalar;
-use super::super::scan::{number, words};
+use super::super::scan::{number, quote, words};
 use super::super::{FormatError, ReadOptions};
 
 /// Packed arrays may be this many times larger than their bytes in the file, and `SLACK` more.
@@ -25,6 +25,8 @@ pub(super) struct Storage<'a> {
     /// Numbers in front of the bytes have 64 bits, not 32.
     pub long: bool,
     pub zipped: bool,
+    /// What packs them where it is not zlib; numbers as text are read all the same.
+    pub packer: Option<&'a str>,
     /// What follows the XML, behind its underscore.
     pub appended: &'a [u8],
     pub appended_base64: bool,
@@ -47,14 +49,25 @@ pub(super) fn budget(bytes: usize, zipped: bool) -> Cell<usize> {
 }
 
 impl Storage<'_> {
+    fn check_packer(&self) -> Result<(), FormatError> {
+        self.packer.map_or(Ok(()), |packer| {
+            Err(FormatError::Content(format!(
+                "arrays packed by {} are not supported; save with vtkZLibDataCompressor or without",
+                quote(packer.as_bytes())
+            )))
+        })
+    }
+
     /// The numbers of an array inside the XML, in base64.
     pub fn inline(&self, text: &str, kind: Scalar) -> Result<Vec<f64>, FormatError> {
+        self.check_packer()?;
         let text: Vec<u8> = text.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
         self.base64(&text, kind)
     }
 
     /// The numbers of an array behind the XML.
     pub fn appended(&self, offset: usize, kind: Scalar) -> Result<Vec<f64>, FormatError> {
+        self.check_packer()?;
         let bytes = self.appended.get(offset..).filter(|bytes| !bytes.is_empty());
         let bytes = bytes.ok_or_else(|| {
             let found = format!("{} bytes of appended data", self.appended.len());

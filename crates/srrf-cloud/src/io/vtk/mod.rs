@@ -14,7 +14,7 @@ use std::io::{self, Write};
 use self::legacy::PointData;
 use self::xml::{What, XmlKind};
 use super::scans::attribute_values;
-use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions};
+use super::{Attribute, CloudFormat, Contents, FormatError, Note, Outgoing, ReadOptions, Room};
 use crate::Rigid;
 
 /// Legacy files of VTK, text and binary: POLYDATA, UNSTRUCTURED_GRID and STRUCTURED_GRID. Polygons,
@@ -161,6 +161,13 @@ impl CloudFormat for VtkXml {
 
     fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
         Ok(attributes(xml::read(bytes, options, What::Data)?.data))
+    }
+
+    fn room(&self) -> Room {
+        match self.kind {
+            XmlKind::PolyData | XmlKind::UnstructuredGrid => Room::Anything,
+            XmlKind::StructuredGrid => Room::Nothing(write::NO_GRID),
+        }
     }
 
     fn write_cloud(&self, cloud: &Outgoing<'_>, out: &mut dyn Write) -> io::Result<()> {

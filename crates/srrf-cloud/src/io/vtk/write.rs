@@ -5,9 +5,11 @@ use std::io::{self, Write};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use super::super::{FormatError, Outgoing};
+use super::super::{FormatError, Outgoing, Room};
 use super::arrays;
 use super::xml::XmlKind;
+
+pub(super) const NO_GRID: &str = "a .vts holds a grid, which other clouds do not have; write .vtp";
 
 fn check(count: usize) -> io::Result<i32> {
     let problem = format!("VTK holds no {count} points; write .ply");
@@ -77,8 +79,7 @@ pub(super) fn xml(kind: XmlKind, cloud: &Outgoing<'_>, out: &mut dyn Write) -> i
             array("UInt8", "types", 1, (0..count).map(|_| 1)),
         ),
         XmlKind::StructuredGrid => {
-            let problem = "a .vts holds a grid, which other clouds do not have; write .vtp";
-            return Err(FormatError::Unwritable(problem.into()).into());
+            return Err(Room::refusal(NO_GRID).into());
         }
     };
     let name = kind.name();

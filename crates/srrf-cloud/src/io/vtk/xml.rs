@@ -131,21 +131,14 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, what: What) -> Result<Xm
             quote(kind.as_bytes())
         )));
     }
-    let zipped = match root.attribute("compressor") {
-        None | Some("") => false,
-        Some("vtkZLibDataCompressor") => true,
-        Some(other) => {
-            return Err(FormatError::Content(format!(
-                "arrays packed by {} are not supported; save with vtkZLibDataCompressor or without",
-                quote(other.as_bytes())
-            )));
-        }
-    };
+    let packer = root.attribute("compressor").filter(|packer| !packer.is_empty());
+    let zipped = packer.is_some();
     let encoding = child(root, "AppendedData").and_then(|node| node.attribute("encoding"));
     let storage = Storage {
         big_endian: root.attribute("byte_order") == Some("BigEndian"),
         long: root.attribute("header_type") == Some("UInt64"),
         zipped,
+        packer: packer.filter(|packer| *packer != "vtkZLibDataCompressor"),
         appended,
         appended_base64: encoding == Some("base64"),
         budget: budget(bytes.len(), zipped),
