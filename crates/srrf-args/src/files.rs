@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use srrf_cloud::io::{
-    CloudFile, Contents, IoError, Kept, Note, Outgoing, ReadOptions, check_format, check_moved_points,
-    read_file, write_atomically, write_outgoing, write_outgoing_to,
+    CloudFile, Contents, IoError, Kept, Note, Outgoing, ReadOptions, as_utf8, check_format,
+    check_moved_points, read_file, write_atomically, write_outgoing, write_outgoing_to,
 };
 use srrf_cloud::{CloudError, PointCloud, Rigid, Solid};
 
@@ -117,12 +117,15 @@ pub fn read_bytes(path: &Path, options: &ReadOptions, should: &str) -> Result<Ve
     })
 }
 
-/// As [`read_bytes`], of text.
+/// As [`read_bytes`], of text, which may be in UTF-16 or UTF-32.
 ///
 /// # Errors
 /// As [`read_bytes`]; also where it is not UTF-8.
 pub fn read_text(path: &Path, options: &ReadOptions, should: &str) -> Result<String, Failure> {
-    String::from_utf8(read_bytes(path, options, should)?)
+    let bytes = read_bytes(path, options, should)?;
+    let text = as_utf8(&bytes)
+        .map_err(|e| Failure::usage(format!("cannot read {path:?}: {e}; {should}")).because(e))?;
+    String::from_utf8(text.into_owned())
         .map_err(|_| Failure::usage(format!("cannot read {path:?}: it is no text in UTF-8; {should}")))
 }
 
@@ -289,6 +292,9 @@ mod tests {
         assert!(error.contains("a.jsonl") && error.contains("--max-memory"), "{error}");
         let error = read_text(&place, &limited(3), "it should be lines").unwrap_err().to_string();
         assert!(error.contains("no text in UTF-8; it should be lines"), "{error}");
+        let words: Vec<u8> = "\u{feff}two words".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        std::fs::write(&place, words).unwrap();
+        assert_eq!(read_text(&place, &ReadOptions::default(), "it should be lines").unwrap(), "two words");
         let error = read_text(&folder.path().join("none"), &limited(3), "it should be lines");
         assert!(error.unwrap_err().to_string().ends_with("; it should be lines"));
     }

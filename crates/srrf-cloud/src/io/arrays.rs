@@ -113,3 +113,32 @@ pub fn read_npz(path: &Path, options: &ReadOptions) -> Result<NpzArrays, ArrayEr
     }
     Ok(npz)
 }
+
+/// All arrays of the bytes of a `.npz` file.
+///
+/// # Errors
+/// [`FormatError`] for what is none, and with the name of an array that cannot be read.
+pub fn parse_npz(bytes: &[u8]) -> Result<NpzArrays, FormatError> {
+    let options = ReadOptions::default();
+    let unreadable =
+        |e: zip::result::ZipError| FormatError::Content(format!("not an NPZ archive, or cut short: {e}"));
+    let mut zip = zip::ZipArchive::new(io::Cursor::new(bytes)).map_err(unreadable)?;
+    let mut npz = NpzArrays::default();
+    let mut held = bytes.len();
+    for index in 0..zip.len() {
+        let mut entry = zip.by_index(index).map_err(unreadable)?;
+        let Some(name) = entry.name().map_err(unreadable)?.strip_suffix(".npy").map(str::to_owned) else {
+            continue;
+        };
+        let said = usize::try_from(entry.size()).unwrap_or(usize::MAX);
+        options.check_memory("the unpacked arrays", held, said)?;
+        let unpacked = npz::unpack(&mut entry, bytes.len() as u64)?;
+        // Words and objects are no numbers, and none of those that are asked for.
+        if let Ok(array) = parse(&unpacked, held.saturating_add(unpacked.len()), &options) {
+            held = held.saturating_add(size_of_val(&array.values[..]));
+            npz.names.push(name.clone());
+            npz.arrays.insert(name, array);
+        }
+    }
+    Ok(npz)
+}

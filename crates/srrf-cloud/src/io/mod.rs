@@ -61,7 +61,7 @@ mod text;
 mod vtk;
 mod width;
 
-pub use arrays::{ArrayError, NpzArrays, read_npy, read_npz};
+pub use arrays::{ArrayError, NpzArrays, parse_npz, read_npy, read_npz};
 pub use atomic::{place_of, remove_left_overs, write_atomically};
 pub use bytes::read_file;
 pub use contents::{Attribute, AttributeValues, Contents, Note, ScanEntry};

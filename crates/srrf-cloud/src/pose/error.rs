@@ -3,8 +3,8 @@
 use crate::io::FormatError;
 
 /// What all messages of a wrong shape end with.
-const EXPECTED: &str = "a pose is 4 rows of 4 numbers, 3 rows of 4, 16 or 12 numbers in a row, `tx ty tz qx qy qz qw`, or \
-                        JSON with `target_from_source`";
+const EXPECTED: &str = "a pose is 4 rows of 4 numbers, 3 rows of 4, 16 or 12 numbers in a row, `tx ty tz qx qy qz qw`, a \
+                        table whose title names these, or JSON with `target_from_source`";
 
 /// Why a file holds no pose.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -12,11 +12,18 @@ pub enum PoseFileError {
     /// Neither text nor an array.
     #[error("neither UTF-8 text nor an .npy array; {EXPECTED}")]
     NotText,
-    /// A `.npz` archive.
+    /// A `.npz` archive with no pose or with several.
     #[error(
-        "an archive (.npz or .zip); save the one matrix with numpy.save as .npy, or with numpy.savetxt as text"
+        "{} of its arrays {names} could be a pose; call the one that maps source coordinates into the target frame \
+         `target_from_source`, or save it alone with numpy.save as .npy",
+        if *.poses == 0 { "none".to_owned() } else { .poses.to_string() }
     )]
-    Archive,
+    Archive {
+        /// How many of the arrays have the shape of a pose.
+        poses: usize,
+        /// The arrays.
+        names: String,
+    },
     /// An array that cannot be read.
     #[error(transparent)]
     NotRead(#[from] FormatError),

@@ -1,13 +1,15 @@
 //! Poses in files: a 4 x 4 or 3 x 4 matrix, 16 or 12 numbers in a row (KITTI), a translation and a quaternion (TUM, ROS),
-//! JSON, and `.npy`.
+//! a table with a title, JSON, `.npy` and `.npz`.
 //!
 //! [`PoseFile::parse`] tells the layouts apart by their shape and names what it found; [`PoseFormat`] writes them. Every
 //! pose maps source coordinates into the target frame, `target ~ R source + t`, and a matrix stands row by row.
 
+mod archive;
 mod error;
 mod json;
 mod matrix;
 mod text;
+mod titled;
 mod write;
 
 use std::fmt;
@@ -16,7 +18,7 @@ pub use error::PoseFileError;
 pub use write::{PoseFormat, PoseNote};
 
 use crate::Rigid;
-use crate::io::Array;
+use crate::io::{Array, as_utf8};
 
 /// The order of the four numbers of a quaternion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,8 +71,12 @@ pub enum PoseLayout {
     },
     /// A translation and a rotation whose parts have names, as ROS has them.
     Named,
+    /// A matrix whose numbers have names, in the title of a table.
+    NamedMatrix,
     /// The key of a JSON object.
     Key(&'static str),
+    /// Arrays of an archive, by their names.
+    Arrays(Vec<String>),
 }
 
 impl fmt::Display for PoseLayout {
@@ -83,6 +89,8 @@ impl fmt::Display for PoseLayout {
             Self::Quaternion { order: QuaternionOrder::Xyzw, .. } => f.write_str("tx ty tz qx qy qz qw"),
             Self::Quaternion { order: QuaternionOrder::Wxyz, .. } => f.write_str("tx ty tz qw qx qy qz"),
             Self::Named => f.write_str("a translation and a quaternion by the names x, y, z, w"),
+            Self::NamedMatrix => f.write_str("a matrix by the names of its columns"),
+            Self::Arrays(names) => write!(f, "the array {} of an archive", names.join(" and the array ")),
             Self::Key(key) => write!(f, "`{key}` of JSON"),
         }
     }
@@ -106,23 +114,13 @@ impl PoseFile {
     /// [`PoseFileError`], with the line, the figure and the way out.
     pub fn parse(bytes: &[u8], order: Option<QuaternionOrder>) -> Result<Self, PoseFileError> {
         if bytes.starts_with(b"\x93NUMPY") {
-            let array = Array::parse(bytes)?;
-            let shape: Vec<usize> = array.shape.iter().copied().filter(|&axis| axis != 1).collect();
-            let columns = match shape[..] {
-                [columns] => columns,
-                [_, columns] => columns,
-                _ => return Err(PoseFileError::Array { shape: array.shape }),
-            };
-            let rows: Vec<text::Row> = array
-                .values
-                .chunks(columns.max(1))
-                .map(|values| text::Row { line: None, values: values.to_vec() })
-                .collect();
-            return text::pose_of_rows(&rows, text::Titled { order: None, asked: order });
+            return of_array(&Array::parse(bytes)?, order);
         }
         if bytes.starts_with(b"PK\x03\x04") {
-            return Err(PoseFileError::Archive);
+            return archive::parse(bytes, order);
         }
+        let decoded = as_utf8(bytes)?;
+        let bytes = &*decoded;
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let text = std::str::from_utf8(bytes).map_err(|_| PoseFileError::NotText)?;
         let begin = text.trim_start();
@@ -131,6 +129,22 @@ impl PoseFile {
         }
         text::parse(text, order)
     }
+}
+
+/// The pose that an array is, by its shape.
+fn of_array(array: &Array, order: Option<QuaternionOrder>) -> Result<PoseFile, PoseFileError> {
+    let shape: Vec<usize> = array.shape.iter().copied().filter(|&axis| axis != 1).collect();
+    let columns = match shape[..] {
+        [columns] => columns,
+        [_, columns] => columns,
+        _ => return Err(PoseFileError::Array { shape: array.shape.clone() }),
+    };
+    let rows: Vec<text::Row> = array
+        .values
+        .chunks(columns.max(1))
+        .map(|values| text::Row { line: None, values: values.to_vec() })
+        .collect();
+    text::pose_of_rows(&rows, text::Titled { order: None, asked: order })
 }
 
 #[cfg(test)]

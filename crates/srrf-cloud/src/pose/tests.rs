@@ -143,8 +143,12 @@ fn what_is_no_pose_is_said_with_its_figure() {
         let message = error(text);
         assert!(message.contains(fact), "{text:?}: {message}");
     }
-    assert_eq!(PoseFile::parse(b"PK\x03\x04", None), Err(PoseFileError::Archive));
     assert_eq!(PoseFile::parse(&[0xff, 0xfe, 0x31], None), Err(PoseFileError::NotText));
+    // PowerShell writes what a program prints in UTF-16.
+    let rows = "\u{feff}1 0 0 5\r\n0 1 0 6\r\n0 0 1 7\r\n0 0 0 1\r\n";
+    let bytes: Vec<u8> = rows.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let read = PoseFile::parse(&bytes, None).unwrap();
+    assert_eq!((read.target_from_source.translation.z, read.layout), (7.0, PoseLayout::Matrix4));
     assert!(matches!(PoseFile::parse(b"\x93NUMPY", None), Err(PoseFileError::NotRead(_))));
 }
 

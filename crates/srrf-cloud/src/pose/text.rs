@@ -31,18 +31,26 @@ pub(super) fn parse(text: &str, asked: Option<QuaternionOrder>) -> Result<PoseFi
             abstained: abstained(text),
         });
     }
+    if let Some(pose) = super::titled::parse(text, abstained(text))? {
+        return Ok(pose);
+    }
     let mut titled = Titled { order: None, asked };
     let mut rows: Vec<Row> = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
         let bare = ["#", "//", "%"].iter().fold(line, |line, mark| line.split(mark).next().unwrap_or(line));
+        let decimal = with_decimal_points(bare);
+        let bare = decimal.as_deref().unwrap_or(bare);
         let words = || bare.split(is_apart).filter(|word| !word.is_empty());
         let is_title = words().next().is_none_or(|word| word.parse::<f64>().is_err());
         if is_title && rows.is_empty() {
             titled.order = titled.order.or_else(|| order_of_title(line));
         }
         // A line of names alone, as a CSV file has it.
-        let of_names = words().all(|word| word.parse::<f64>().is_err() && word.len() > 1);
-        if words().next().is_none() || (rows.is_empty() && of_names && order_of_title(line).is_some()) {
+        let of_names = words().all(|word| word.parse::<f64>().is_err());
+        let of_many = words().count() > 6;
+        if words().next().is_none()
+            || (rows.is_empty() && of_names && (of_many || order_of_title(line).is_some()))
+        {
             continue;
         }
         let value = |word: &str| {
@@ -56,7 +64,38 @@ pub(super) fn parse(text: &str, asked: Option<QuaternionOrder>) -> Result<PoseFi
             break;
         }
     }
+    without_numbers_of_rows(text, &mut rows);
     Ok(PoseFile { abstained: abstained(text), ..pose_of_rows(&rows, titled)? })
+}
+
+/// The line with points in its numbers, where it has decimal commas and semicolons between the fields.
+fn with_decimal_points(line: &str) -> Option<String> {
+    let fields: Vec<&str> = line.split(';').map(str::trim).filter(|field| !field.is_empty()).collect();
+    let decimal =
+        |field: &&str| field.matches(',').count() < 2 && field.replace(',', ".").parse::<f64>().is_ok();
+    let all = fields.len() > 2 && line.contains(',') && fields.iter().all(|field| decimal(&field));
+    all.then(|| line.replace(',', "."))
+}
+
+/// Takes the numbers of columns and rows away that pandas writes: a first row 0, 1, 2, 3 and so on, and a first column.
+/// Neither can be a part of a pose.
+fn without_numbers_of_rows(text: &str, rows: &mut Vec<Row>) {
+    let counts =
+        |numbers: &mut dyn Iterator<Item = f64>| numbers.enumerate().all(|(place, n)| n == place as f64);
+    let Some(first) = rows.first().map(|row| row.values.clone()) else { return };
+    if !matches!(first.len(), 4 | 12 | 16) || rows.len() < 2 || !counts(&mut first.iter().copied()) {
+        return;
+    }
+    let behind = first.len() + 1;
+    let numbered = text.trim_start().starts_with([',', ';'])
+        && rows[1..].iter().all(|row| row.values.len() == behind)
+        && counts(&mut rows[1..].iter().map(|row| row.values[0]));
+    rows.remove(0);
+    if numbered {
+        rows.iter_mut().for_each(|row| {
+            row.values.remove(0);
+        });
+    }
 }
 
 /// What stands between numbers.

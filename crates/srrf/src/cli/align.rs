@@ -247,8 +247,8 @@ impl AlignArgs {
     }
 
     /// Writes what was asked for; says what was written. One that fails does not keep the others from being written.
-    fn write(&self, map: &Map, scans: &ScanFiles, registrar: &Registrar, seconds: f64) -> Written {
-        let mut written = Written::default();
+    fn write(&self, map: &Map, scans: &ScanFiles, registrar: &Registrar, seconds: f64) -> MapOutputs {
+        let mut written = MapOutputs::default();
         let mut put =
             |path: Option<&PathBuf>, holds_poses: bool, write: &dyn Fn(&Path) -> Result<String, Failure>| {
                 let Some(path) = path else { return };
@@ -293,7 +293,7 @@ impl AlignArgs {
 
 /// What became of the outputs.
 #[derive(Debug, Default)]
-struct Written {
+struct MapOutputs {
     lines: Vec<String>,
     failed: Vec<Failure>,
     /// Whether the poses are in one of them.

@@ -139,7 +139,10 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
     outcome.warnings.extend(initial.and_then(|pose| looks_inverted(&pose, &source.cloud, &target.cloud)));
 
     let written = if outcome.abstain && args.require_answer {
-        Written { lines: vec!["--require-answer: nothing was written".to_owned()], ..Written::default() }
+        PairOutputs {
+            lines: vec!["--require-answer: nothing was written".to_owned()],
+            ..PairOutputs::default()
+        }
     } else {
         args.write(&outcome, &source, &target, initial.as_ref(), &progress)
     };
@@ -204,8 +207,8 @@ impl RegisterArgs {
         target: &Input,
         initial: Option<&Rigid>,
         progress: &Progress,
-    ) -> Written {
-        let mut written = Written::default();
+    ) -> PairOutputs {
+        let mut written = PairOutputs::default();
         let mut put =
             |path: Option<&PathBuf>, holds_pose: bool, write: &dyn Fn(&Path) -> Result<String, Failure>| {
                 let Some(path) = path else { return };
@@ -253,14 +256,14 @@ impl RegisterArgs {
 
 /// What became of the outputs.
 #[derive(Debug, Default)]
-struct Written {
+struct PairOutputs {
     lines: Vec<String>,
     failed: Vec<Failure>,
     /// Whether the pose is in one of them.
     holds_pose: bool,
 }
 
-impl Written {
+impl PairOutputs {
     /// The failure of the outputs that could not be written, with the pose where no file has it.
     fn failure(self, pose: &Rigid) -> Option<Failure> {
         let rows = pose.to_matrix4();

@@ -1,6 +1,7 @@
 //! Arrays as columns of one value a point.
 
 use super::header::{Descr, NpyHeader, NpyKind};
+use crate::io::scalar::Scalar;
 use crate::io::{AttributeValues, FormatError};
 
 /// Columns of an array that are taken at most.
@@ -42,5 +43,34 @@ pub(in super::super) fn array_of(columns: &[&AttributeValues]) -> Vec<u8> {
     for row in 0..rows {
         columns.iter().for_each(|column| column.put(row, &mut bytes));
     }
+    bytes
+}
+
+/// Whether the array at the begin of `bytes` holds single numbers.
+pub(in super::super) fn holds_numbers(bytes: &[u8]) -> bool {
+    NpyHeader::parse(bytes).is_ok_and(|header| matches!(header.descr, Descr::Plain(_)) && !header.booleans)
+}
+
+/// The type of the numbers of an array.
+///
+/// # Errors
+/// [`FormatError::Content`] for an array of fields.
+pub(in super::super) fn kind_of(bytes: &[u8]) -> Result<Scalar, FormatError> {
+    match NpyHeader::parse(bytes)?.descr {
+        Descr::Plain(kind) => Ok(kind.scalar),
+        Descr::Fields(_) => Err(FormatError::Content("an array of fields is no coordinate".into())),
+    }
+}
+
+/// The bytes of an array of this shape, in C order.
+pub(in super::super) fn array_of_shape(
+    shape: &[usize],
+    kind: Scalar,
+    values: impl Iterator<Item = f64>,
+) -> Vec<u8> {
+    let shape: Vec<u64> = shape.iter().map(|&axis| axis as u64).collect();
+    let mut bytes =
+        NpyHeader::bytes(&Descr::Plain(NpyKind { scalar: kind, big_endian: false }), false, &shape);
+    values.for_each(|value| kind.put(value, false, &mut bytes));
     bytes
 }

@@ -6,7 +6,7 @@ mod header;
 mod shape;
 
 pub use array::Array;
-pub(super) use columns::{array_of, columns};
+pub(super) use columns::{array_of, array_of_shape, columns, holds_numbers, kind_of};
 
 use std::io::{self, Write};
 

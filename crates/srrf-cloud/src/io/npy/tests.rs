@@ -75,7 +75,7 @@ fn bad_arrays() {
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (4611686018427387904, 3), }", "no memory"),
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000000, 3), }", "announced"),
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (0, 1000000000000000000), }", ""),
-        ("{'descr': '|O', 'fortran_order': False, 'shape': (1, 3), }", "type \"|O\""),
+        ("{'descr': '|O', 'fortran_order': False, 'shape': (1, 3), }", "holds Python objects"),
         ("{'descr': [('x', '<f8', (3,))], 'fortran_order': False, 'shape': (1,), }", "announced"),
         ("{'shape': (1, 3)}", "lacks"),
         ("{'descr': '<f8", "end of a string"),

@@ -3,12 +3,13 @@
 use csv_core::ReadFieldResult;
 use srrf_args::words::visible;
 
-/// The fields of each record, trimmed, with the line that it begins on.
+/// The fields of each record, trimmed, with the line that it begins on. What separates them is a comma, or the semicolon or
+/// tab of a first line without commas, as spreadsheets of many countries have it.
 ///
 /// # Errors
 /// The line that is not UTF-8.
 pub fn records(mut bytes: &[u8]) -> Result<Vec<(u64, Vec<String>)>, String> {
-    let mut reader = csv_core::Reader::new();
+    let mut reader = csv_core::ReaderBuilder::new().delimiter(delimiter(bytes)).build();
     let (mut found, mut fields, mut field) = (Vec::new(), Vec::new(), Vec::new());
     let mut buffer = [0; 1024];
     let mut line = reader.line();
@@ -32,6 +33,11 @@ pub fn records(mut bytes: &[u8]) -> Result<Vec<(u64, Vec<String>)>, String> {
             ReadFieldResult::End => return Ok(found),
         }
     }
+}
+
+fn delimiter(bytes: &[u8]) -> u8 {
+    let first = bytes.split(|b| matches!(b, b'\n' | b'\r')).next().unwrap_or_default();
+    [b',', b';', b'\t'].into_iter().find(|mark| first.contains(mark)).unwrap_or(b',')
 }
 
 /// Words of others as neither a spreadsheet nor a terminal obeys them: behind `'` what would be a formula, control
@@ -79,6 +85,10 @@ mod tests {
         let text = line(fields);
         assert_eq!(text, "a b,\"x, \"\"y\"\"\",,\"two\nlines\",ü\n");
         assert_eq!(records(text.as_bytes()).unwrap(), [(1, fields.map(str::to_owned).to_vec())]);
+        for text in ["source;target\na, b.ply;c.ply\n", "source\ttarget\r\na, b.ply\tc.ply\r\n"] {
+            let read = records(text.as_bytes()).unwrap();
+            assert_eq!((&*read[0].1[1], &*read[1].1[0], &*read[1].1[1]), ("target", "a, b.ply", "c.ply"));
+        }
         assert!(records(b"a,\xff\n").unwrap_err().starts_with("line 1: not UTF-8"));
     }
 }

@@ -10,7 +10,7 @@ use super::pair::{COLUMNS, ListedPair, Record};
 use super::parquet_list;
 use srrf_args::reading::check_taken;
 use srrf_args::{Failure, Places, files};
-use srrf_cloud::io::{ReadOptions, Taken, check_parquet};
+use srrf_cloud::io::{ReadOptions, Taken, as_utf8, check_parquet};
 
 /// The pairs of a batch.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,6 +73,7 @@ pub(super) fn records(path: &Path, options: &ReadOptions) -> Result<Vec<Record>,
     } else if extension == "parquet" {
         Err("it is no Parquet file; was it written whole?".into())
     } else {
+        let bytes = as_utf8(&bytes).map_err(|e| Failure::usage(format!("{path:?}: {e}")))?;
         if matches!(&*extension, "jsonl" | "ndjson" | "json") {
             json_lines(&bytes)
         } else {

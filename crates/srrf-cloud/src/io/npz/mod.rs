@@ -1,46 +1,27 @@
 //! NumPy's archives of arrays.
 
+mod axes;
+mod choice;
+
 use std::io::{self, Cursor, Read, Write};
 
 use zip::read::ZipFile;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-use super::npy::{Npy, array_of, columns, could_be_cloud, known};
+use self::choice::{NpzCloud, choose};
+use super::npy::{Npy, array_of, columns, known};
 use super::outgoing::{COLOURS, INTENSITY, NORMALS};
 use super::{Attribute, CloudFormat, Contents, FormatError, Outgoing, ReadOptions, ReadSwitch};
 use crate::Rigid;
 
-/// Names of the array that is the cloud.
-const NAMES: [&str; 20] = [
-    "points",
-    "point",
-    "xyz",
-    "positions",
-    "position",
-    "pos",
-    "pts",
-    "coords",
-    "coord",
-    "coordinates",
-    "cloud",
-    "pointcloud",
-    "point_cloud",
-    "pcd",
-    "pc",
-    "pcl",
-    "vertices",
-    "verts",
-    "data",
-    "arr_0",
-];
 /// Arrays may unpack to this many times their size in the archive and `SLACK` more: real clouds do not
 /// come near, and a small file cannot fill the memory.
 const RATIO: u64 = 200;
 const SLACK: u64 = 1 << 20;
 
 /// NPZ archives, compressed or not. The cloud is the array that [`ReadOptions::array`] names, or the only one with a
-/// name of [`NAMES`], or the only one whose shape is that of a cloud.
+/// usual name such as `points`, or three arrays that are x, y and z, or the only array whose shape is that of a cloud.
 /// Written with the array `points`, and `colors`, `normals` and one more for each other attribute. A moved copy keeps
 /// all other arrays as they are.
 pub(super) struct Npz;
@@ -67,17 +48,23 @@ impl CloudFormat for Npz {
 
     fn read(&self, bytes: &[u8], options: &ReadOptions) -> Result<Contents, FormatError> {
         let mut archive = open(bytes)?;
-        let cloud = choose(&mut archive, options)?;
-        Npy.read(&unpack_at(&mut archive, cloud, bytes.len(), options)?, options)
+        match choose(&mut archive, options)? {
+            NpzCloud::One(cloud) => Npy.read(&unpack_at(&mut archive, cloud, bytes.len(), options)?, options),
+            NpzCloud::Axes(places) => axes::read(&mut archive, &places, bytes.len(), options)?.contents(),
+        }
     }
 
     fn attributes(&self, bytes: &[u8], options: &ReadOptions) -> Result<Vec<Attribute>, FormatError> {
         let points = self.read(bytes, options)?.points.len();
         let mut archive = open(bytes)?;
         let cloud = choose(&mut archive, options)?;
-        let mut attributes =
-            Npy.attributes(&unpack_at(&mut archive, cloud, bytes.len(), options)?, options)?;
-        for index in (0..archive.len()).filter(|&index| index != cloud) {
+        let mut attributes = match &cloud {
+            NpzCloud::One(cloud) => {
+                Npy.attributes(&unpack_at(&mut archive, *cloud, bytes.len(), options)?, options)?
+            }
+            NpzCloud::Axes(_) => Vec::new(),
+        };
+        for index in (0..archive.len()).filter(|&index| !cloud.is_of(index)) {
             let name =
                 archive.by_index(index).ok().and_then(|entry| entry.name().ok().map(|n| n.into_owned()));
             let Some(name) = name.as_deref().and_then(|name| name.strip_suffix(".npy")) else { continue };
@@ -132,17 +119,26 @@ impl CloudFormat for Npz {
     ) -> io::Result<()> {
         let mut archive = open(bytes)?;
         let cloud = choose(&mut archive, options)?;
-        let array = unpack_at(&mut archive, cloud, bytes.len(), options)?;
-        let mut copy = Vec::new();
-        Npy.rewrite(&array, options, motion, &mut copy)?;
+        let copies: Vec<(usize, Vec<u8>)> = match &cloud {
+            NpzCloud::One(cloud) => {
+                let array = unpack_at(&mut archive, *cloud, bytes.len(), options)?;
+                let mut copy = Vec::new();
+                Npy.rewrite(&array, options, motion, &mut copy)?;
+                vec![(*cloud, copy)]
+            }
+            NpzCloud::Axes(places) => {
+                axes::read(&mut archive, places, bytes.len(), options)?.moved(places, motion)?
+            }
+        };
         let mut written = ZipWriter::new(Cursor::new(Vec::new()));
         for index in 0..archive.len() {
             let entry = archive.by_index_raw(index)?;
-            if index == cloud {
-                let (name, method) = (entry.name()?.into_owned(), entry.compression());
-                put(&mut written, &name, method, &copy)?;
-            } else {
-                written.raw_copy_file(entry)?;
+            match copies.iter().find(|(copied, _)| *copied == index) {
+                Some((_, copy)) => {
+                    let (name, method) = (entry.name()?.into_owned(), entry.compression());
+                    put(&mut written, &name, method, copy)?;
+                }
+                None => written.raw_copy_file(entry)?,
             }
         }
         out.write_all(written.finish()?.get_ref())
@@ -171,56 +167,6 @@ type Archive<'a> = ZipArchive<Cursor<&'a [u8]>>;
 fn open(bytes: &[u8]) -> Result<Archive<'_>, FormatError> {
     let problem = |e| FormatError::Content(format!("not an NPZ archive, or cut short: {e}"));
     ZipArchive::new(Cursor::new(bytes)).map_err(problem)
-}
-
-/// The index of the array that is the cloud.
-fn choose(archive: &mut Archive, options: &ReadOptions) -> Result<usize, FormatError> {
-    let mut arrays = Vec::new();
-    for index in 0..archive.len() {
-        let Ok(entry) = archive.by_index(index) else { continue };
-        let Some(name) = entry.name().ok().and_then(|name| Some(name.strip_suffix(".npy")?.to_owned()))
-        else {
-            continue;
-        };
-        // Enough for the header of any array that could be a cloud.
-        let mut begin = Vec::new();
-        let could_be = entry.take(16_384).read_to_end(&mut begin).is_ok() && could_be_cloud(&begin);
-        arrays.push((index, name, could_be));
-    }
-    let names: Vec<&str> = arrays.iter().map(|(_, name, _)| name.as_str()).take(20).collect();
-    if let Some(asked) = &options.array {
-        let asked = asked.strip_suffix(".npy").unwrap_or(asked);
-        let found = arrays.iter().find(|(_, name, _)| name == asked);
-        return found.map(|(index, _, _)| *index).ok_or_else(|| {
-            FormatError::unclear(format!("there is no array {asked:?}; the arrays are {names:?}"), "--array")
-        });
-    }
-    let usual = |name: &str| NAMES.contains(&name.to_ascii_lowercase().as_str());
-    let named = || arrays.iter().filter(|(_, name, _)| usual(name));
-    let fitting = || arrays.iter().filter(|(_, _, could_be)| *could_be);
-    let both = || fitting().filter(|(_, name, _)| usual(name));
-    let counts = [both().count(), named().count(), fitting().count()];
-    let one = match counts {
-        [1, _, _] => both().next(),
-        // Said by its name, so that its own error tells what is wrong with it.
-        [0, 1, _] => named().next(),
-        [0, 0, 1] => fitting().next(),
-        _ => None,
-    };
-    one.map(|(index, _, _)| *index).ok_or_else(|| {
-        if counts[2] == 0 {
-            let problem = format!(
-                "of the arrays {names:?} none has a shape [points, 3]; save one that has, such as \
-                 `points=numpy.stack([x, y, z], axis=1)`"
-            );
-            return FormatError::Content(problem);
-        }
-        let several: Vec<&str> = fitting().map(|(_, name, _)| name.as_str()).take(20).collect();
-        FormatError::unclear(
-            format!("of the arrays {names:?} more than one could be the cloud: {several:?}"),
-            "--array",
-        )
-    })
 }
 
 /// The bytes of the array of this index.
