@@ -106,6 +106,11 @@ add("decimal-commas-quoted.csv", csv("x,y,z", lambda i, p: ",".join(f'"{c}"' for
 add("decimal-commas.txt", csv("x\ty\tz", lambda i, p: "\t".join(comma(p))))
 add("thousands.csv", 'x,y,z\n"1,234","2,345","3,456"\n', error="thousands")
 add("words.csv", csv("name,x,y,z", lambda i, p: '"a, {}\nb","{}","{}","{}"'.format(i, *p)))
+for encoding in ["utf-16-le", "utf-16-be", "utf-32-le", "utf-32-be"]:
+    for name, mark in [(encoding, ""), (encoding + "-marked", "\ufeff")]:
+        add(f"{name}.csv", (mark + csv("x,y,z")).encode(encoding))
+        add(f"{name}.off", f"{mark}OFF\n{N} 0 0\n{text()}".encode(encoding))
+add("cut.csv", ("\ufeff" + csv("x,y,z")).encode("utf-16-le")[:-1], error=["UTF-16", "damaged at character", "UTF-8"])
 add("excel.csv", "sep=;\r\n" + csv("x;y;z", lambda i, p: "{};{};{}".format(*p), end="\r\n"))
 add("empty-cells.csv", csv("x,y,z") + "1,,3\n,,\nNA,1,2\n1,2,#N/A\n")
 add("empty-cells.txt", csv("x\ty\tz\tn", lambda i, p: "{}\t{}\t{}\t".format(*p)) + "1\t\t3\t4\n")
@@ -132,6 +137,12 @@ add("fields.npy", npy(fields, (N,), b"".join(map(row, P))))
 add("open3d.npz", npz(positions=plain(), colors=npy("'<f4'", (N, 3), floats([(0.5, 0.5, 0.5)] * N))))
 for name in ["pts", "coord", "pc", "xyz"]:
     add(f"named-{name}.npz", npz(**{name: plain(), "faces": npy("'<i4'", (1, 3), bytes(12))}))
+column = lambda axis: npy("'<f8'", (N,), b"".join(struct.pack("<d", p[axis]) for p in P))
+add("xyz.npz", npz(x=column(0), y=column(1), z=column(2), colors=npy("'<f4'", (N, 3), bytes(12 * N))))
+add("easting.npz", npz(height=column(2), easting=column(0), northing=column(1)))
+add("said-axes.npz", npz(a=column(0), b=column(1), c=column(2)), ["--columns", "a,b,c"])
+add("colours-alone.npz", npz(colors=plain()), error=["--array", "its name says another"])
+add("objects.npy", npy("'|O'", (2,), b"\x80\x04"), error="Python objects")
 add("two-arrays.npz", npz(a=plain(), b=plain()), error="--array")
 add("said-array.npz", npz(a=plain(), b=npy("'<f4'", (2, 3), bytes(24))), ["--array", "a"])
 
@@ -231,6 +242,9 @@ half = [text(lambda i, p: "{} {} {} 0.5".format(*p), points=half) for half in (P
 ptx = f"20\n1\n{still}{half[0]}20\n1\n{move}{half[1]}"
 add("two.ptx", ptx, points=P[:20] + [(x + 10, y, z) for x, y, z in P[20:]])
 add("second.ptx", ptx, ["--scan", "2"], [(x + 10, y, z) for x, y, z in P[20:]])
+add("one-more.pts", f"{N - 1}\n{text()}", error=[f"announces {N - 1} points, and {N} follow"])
+add("one-fewer.pts", f"{N + 1}\n{text()}", error=f"{N + 1} points announced, {N} found")
+add("off-in-two.pts", f"21\n{half[0]}20\n{half[1]}", ["--scan", "1"], error="21 points announced, 20 found")
 add("two.pts", f"20\n{half[0]}20\n{half[1]}", scans=2)
 add("second.pts", f"20\n{half[0]}20\n{half[1]}", ["--scan", "2"], P[20:])
 vtk = "# vtk DataFile Version 3.0\na\n{}\nDATASET POLYDATA\nPOINTS 40 float\n"

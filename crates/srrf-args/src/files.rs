@@ -191,7 +191,9 @@ pub fn write_points(path: &Path, cloud: &PointCloud, original: &Input) -> Result
     let cloud = Outgoing { single, before, ..Outgoing::of_points(cloud.points()) };
     Ok(match () {
         () if is_stream(path) => write_outgoing_to(&mut io::stdout().lock(), "ply", &cloud),
-        () if is_special(path) => write_outgoing_to(&mut open(path)?, "ply", &cloud),
+        () if is_special(path) => {
+            write_outgoing_to(&mut open(path)?, "ply", &cloud).map_err(|error| at_path(error, path))
+        }
         () => write_outgoing(path, &cloud),
     }?)
 }
@@ -221,7 +223,9 @@ pub fn write_moved(path: &Path, file: &CloudFile, pose: &Rigid) -> Result<Kept, 
     let _guard = interrupt::hold();
     Ok(match () {
         () if is_stream(path) => file.write_transformed_to(&mut io::stdout().lock(), None, pose),
-        () if is_special(path) => file.write_transformed_to(&mut open(path)?, None, pose),
+        () if is_special(path) => {
+            file.write_transformed_to(&mut open(path)?, None, pose).map_err(|error| at_path(error, path))
+        }
         () => file.write_transformed(path, pose),
     }?)
 }
@@ -252,6 +256,14 @@ pub fn check_points(path: &Path, points: Option<&[[f64; 3]]>, target: &[[f64; 3]
         None => check_format(path),
     };
     checked.map_err(Failure::input)
+}
+
+/// An error of a stream, of the device that it is.
+fn at_path(error: IoError, path: &Path) -> IoError {
+    match error {
+        IoError::Write { source, .. } => IoError::Write { path: path.to_owned(), source },
+        other => other,
+    }
 }
 
 fn open(path: &Path) -> Result<File, IoError> {

@@ -257,7 +257,7 @@ impl CloudFile {
         }
         if let Some(copy) = format.rewrite_from(self.format.name(), &self.bytes, &self.options, motion) {
             out.write_all(&copy?)?;
-            return Ok(Kept::default());
+            return Ok(Kept { lost: format.lost_in_copies(&self.bytes), ..Kept::default() });
         }
         let contents = self.read()?;
         let mut attributes = self.format.attributes(&self.bytes, &self.options)?;
@@ -283,8 +283,11 @@ impl CloudFile {
     /// A copy in the format of the file.
     fn rewrite(&self, extension: &str, motion: &Rigid, out: &mut dyn Write) -> io::Result<Kept> {
         self.format.rewrite(&self.bytes, &self.options, motion, out)?;
-        if !self.format.has_both_precisions() || *motion == Rigid::identity() {
+        if *motion == Rigid::identity() {
             return Ok(Kept::default());
+        }
+        if !self.format.has_both_precisions() {
+            return Ok(Kept { lost: self.format.lost_in_copies(&self.bytes), ..Kept::default() });
         }
         let contents = self.read()?;
         let points: Vec<[f64; 3]> =

@@ -147,6 +147,12 @@ pub trait CloudFormat: Sync {
         None
     }
 
+    /// What a moved copy of a file lacks although it is of the same format, or of a [twin](Self::rewrite_from) of it.
+    fn lost_in_copies(&self, bytes: &[u8]) -> Vec<String> {
+        let _ = bytes;
+        Vec::new()
+    }
+
     /// Whether a file of this content is what the readers of files with this extension expect; one that is not is
     /// written anew and not copied.
     fn conforms(&self, bytes: &[u8], extension: &str) -> bool {

@@ -47,10 +47,10 @@ pub(super) fn parse(text: &str, asked: Option<QuaternionOrder>) -> Result<PoseFi
         }
         // A line of names alone, as a CSV file has it.
         let of_names = words().all(|word| word.parse::<f64>().is_err());
-        let of_many = words().count() > 6;
-        if words().next().is_none()
-            || (rows.is_empty() && of_names && (of_many || order_of_title(line).is_some()))
-        {
+        // Names that say nothing of an order of numbers: it is that of the rows of a matrix, or the user says it.
+        let (count, known) = (words().count(), order_of_title(line).is_some() || asked.is_some());
+        let of_many = count > 11 || (count > 6 && known);
+        if words().next().is_none() || (rows.is_empty() && of_names && of_many) {
             continue;
         }
         let value = |word: &str| {
@@ -73,7 +73,7 @@ fn with_decimal_points(line: &str) -> Option<String> {
     let fields: Vec<&str> = line.split(';').map(str::trim).filter(|field| !field.is_empty()).collect();
     let decimal =
         |field: &&str| field.matches(',').count() < 2 && field.replace(',', ".").parse::<f64>().is_ok();
-    let all = fields.len() > 2 && line.contains(',') && fields.iter().all(|field| decimal(&field));
+    let all = fields.len() > 2 && line.contains(',') && fields.iter().all(decimal);
     all.then(|| line.replace(',', "."))
 }
 
@@ -87,7 +87,7 @@ fn without_numbers_of_rows(text: &str, rows: &mut Vec<Row>) {
         return;
     }
     let behind = first.len() + 1;
-    let numbered = text.trim_start().starts_with([',', ';'])
+    let numbered = text.trim_start_matches([' ', '\r', '\n', '\u{feff}']).starts_with([',', ';', '\t'])
         && rows[1..].iter().all(|row| row.values.len() == behind)
         && counts(&mut rows[1..].iter().map(|row| row.values[0]));
     rows.remove(0);

@@ -58,7 +58,7 @@ fn table(text: &str) -> Option<TitledRow<'_>> {
     let (line, first) = loop {
         let (number, line) = rows.next()?;
         let bare = line.trim().trim_start_matches(['#', '%', '/']);
-        let names = fields(bare).iter().all(|field| field.parse::<f64>().is_err());
+        let names = fields(bare).iter().all(|field| field.replacen(',', ".", 1).parse::<f64>().is_err());
         if !names && bare == line.trim() {
             break (number, line);
         }
@@ -233,6 +233,7 @@ mod tests {
                 "\"x [m]\";\"y [m]\";\"z [m]\";\"qx\";\"qy\";\"qz\";\"qw\"\n{x};{y};{z};{a};{b};{c};{d}\n"
             )
             .replace('.', ","),
+            format!("name;qw;qx;qy;qz;x;y;z\na.ply;{d};{a};{b};{c};{x};{y};{z}\n").replace('.', ","),
             format!("# timestamp tx ty tz qx qy qz qw\n5 {x} {y} {z} {a} {b} {c} {d}\n"),
             format!(
                 "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x \
@@ -245,6 +246,11 @@ mod tests {
         ] {
             check(&text, None);
         }
+        // Which of q0 to q3 is w, their names do not say; the user may.
+        let numbered = format!("x,y,z,q0,q1,q2,q3\n{x},{y},{z},{d},{a},{b},{c}\n");
+        assert!(matches!(read(&numbered), Err(PoseFileError::Number { line: 1, .. })));
+        let said = PoseFile::parse(numbered.as_bytes(), Some(QuaternionOrder::Wxyz)).unwrap();
+        assert!((said.target_from_source.to_matrix4() - truth().to_matrix4()).abs().max() < 1e-12);
         let two = "tx,ty,tz,qx,qy,qz,qw\n0,0,0,0,0,0,1\n1,0,0,0,0,0,1\n";
         assert_eq!(read(two), Err(PoseFileError::Trajectory { poses: 2 }));
         let word = read("tx,ty,tz,qx,qy,qz,qw\n0,0,zero,0,0,0,1\n").unwrap_err().to_string();
@@ -300,6 +306,10 @@ mod tests {
         check(&format!("0,1,2,3\n{}\n{}\n{}\n{}\n", row(0), row(1), row(2), row(3)), &PoseLayout::Matrix4);
         check(
             &format!(",0,1,2,3\n0,{}\n1,{}\n2,{}\n3,{}\n", row(0), row(1), row(2), row(3)),
+            &PoseLayout::Matrix4,
+        );
+        check(
+            &format!(",0,1,2,3\n0,{}\n1,{}\n2,{}\n3,{}\n", row(0), row(1), row(2), row(3)).replace(',', "\t"),
             &PoseLayout::Matrix4,
         );
         check(&format!("0,1,2,3\n{}\n{}\n{}\n", row(0), row(1), row(2)), &PoseLayout::Matrix3x4);

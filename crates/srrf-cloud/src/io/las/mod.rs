@@ -6,6 +6,7 @@ mod attributes;
 mod convert;
 mod header;
 mod laz_record;
+mod octree;
 mod zipped;
 
 use std::borrow::Cow;
@@ -87,6 +88,10 @@ impl CloudFormat for LasFormat {
         out.write_all(&file(cloud, self.zipped)?)
     }
 
+    fn lost_in_copies(&self, bytes: &[u8]) -> Vec<String> {
+        if octree::is_there(bytes) { vec!["the octree of COPC".to_owned()] } else { Vec::new() }
+    }
+
     fn rewrite_from(
         &self,
         format: &str,
@@ -95,7 +100,11 @@ impl CloudFormat for LasFormat {
         motion: &Rigid,
     ) -> Option<io::Result<Vec<u8>>> {
         let twin = if self.zipped { "las" } else { "laz" };
-        let repack = |moved: Vec<u8>| convert::repacked(&moved, options, self.zipped);
+        let repack = |moved: Vec<u8>| {
+            let mut copy = convert::repacked(&moved, options, self.zipped)?;
+            octree::take_away(&mut copy);
+            Ok(copy)
+        };
         (format == twin).then(|| rewritten(bytes, options, motion).and_then(repack))
     }
 
@@ -236,6 +245,7 @@ fn rewritten(bytes: &[u8], options: &ReadOptions, motion: &Rigid) -> io::Result<
     if !header.zipped {
         copy.extend(&records);
         copy.extend(&bytes[header.points_at + records.len()..]);
+        octree::take_away(&mut copy);
         return Ok(copy);
     }
     check_movable(&header, bytes)?;
@@ -246,6 +256,7 @@ fn rewritten(bytes: &[u8], options: &ReadOptions, motion: &Rigid) -> io::Result<
         header::put_word(&mut copy, 235, &at.to_le_bytes());
         copy.extend(tail);
     }
+    octree::take_away(&mut copy);
     Ok(copy)
 }
 

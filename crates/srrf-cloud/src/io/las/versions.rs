@@ -83,7 +83,12 @@ fn file(format: u8, extra: usize, chunks: Chunks, points: &[[f64; 3]]) -> Vec<u8
     // COPC has its octree behind the points.
     out.set_position(out.get_ref().len() as u64);
     let at = out.position();
-    out.write_all(&[7; 100]).unwrap();
+    let mut tail = vec![0; 60];
+    header::put_word(&mut tail, 2, b"copc");
+    header::put_word(&mut tail, 18, &1000u16.to_le_bytes());
+    header::put_word(&mut tail, 20, &40u64.to_le_bytes());
+    tail.extend([7; 40]);
+    out.write_all(&tail).unwrap();
     let mut bytes = out.into_inner();
     bytes[235..243].copy_from_slice(&at.to_le_bytes());
     bytes[243..247].copy_from_slice(&1u32.to_le_bytes());
@@ -125,4 +130,13 @@ fn copc_moves() {
         let expected = [old[0] + 10.0, old[1] + 20.0, old[2] - 0.5];
         assert!((0..3).all(|axis| (expected[axis] - new[axis]).abs() < 1e-6), "{expected:?} {new:?}");
     }
+    // The octree names places in the file, and they are others now: the copy is a LAZ file and no COPC.
+    assert_eq!(LAZ.lost_in_copies(&bytes), ["the octree of COPC"]);
+    let unpacked = LAS.rewrite_from("laz", &bytes, &ReadOptions::default(), &motion).unwrap().unwrap();
+    for copy in [&copy, &unpacked] {
+        assert!(LAZ.lost_in_copies(copy).is_empty() && super::read(copy, &ReadOptions::default()).is_ok());
+        let names = copy.windows(16).filter(|name| *name == b"copc before move").count();
+        assert_eq!(names, 2, "the record in front and the one behind the points");
+    }
+    assert!(LAZ.lost_in_copies(&file(7, 0, Chunks::None, &points)).is_empty());
 }
