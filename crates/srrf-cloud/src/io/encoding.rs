@@ -47,10 +47,16 @@ impl TextEncoding {
 
     fn is_of(self, begin: &[u8]) -> bool {
         let marked = begin.starts_with(self.mark());
-        let (mut all, mut plain) = (0usize, 0usize);
+        let (mut all, mut plain, mut ended) = (0usize, 0usize, false);
         for character in self.characters(begin.strip_prefix(self.mark()).unwrap_or(begin)) {
-            // What is cut at the end is no character.
-            let Some(character) = character else { continue };
+            // What is cut at the end is no character, and nothing follows it.
+            let Some(character) = character.filter(|_| !ended) else {
+                if ended {
+                    return false;
+                }
+                ended = true;
+                continue;
+            };
             if character.is_control() && !matches!(character, '\t' | '\n' | '\r' | '\u{c}') {
                 return false;
             }
@@ -159,10 +165,20 @@ mod tests {
         let words: Vec<u8> = (0..400u16).flat_map(u16::to_le_bytes).collect();
         let zeros = [0; 64];
         let marked = [&[0xff, 0xfe][..], &floats].concat();
+        let some: Vec<u8> = (0..9).flat_map(|_| [0, 0, 0, b'7', 0xff, 0xff, 0xff, 0xff]).collect();
         let german = b"x y H\xf6he\n1 2 3\n";
-        for bytes in
-            [&b"1 2 3\n"[..], b"", b"1", "\u{feff}1 2 3".as_bytes(), &floats, &words, &zeros, &marked, german]
-        {
+        for bytes in [
+            &b"1 2 3\n"[..],
+            b"",
+            b"1",
+            "\u{feff}1 2 3".as_bytes(),
+            &floats,
+            &words,
+            &zeros,
+            &some,
+            &marked,
+            german,
+        ] {
             assert_eq!(TextEncoding::of(bytes), None, "{:?}", &bytes[..bytes.len().min(8)]);
             assert!(matches!(as_utf8(bytes), Ok(Cow::Borrowed(same)) if same == bytes));
         }

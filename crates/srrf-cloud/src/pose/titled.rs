@@ -20,7 +20,10 @@ impl TitledRow<'_> {
     fn is_plain(&self, places: &[usize]) -> bool {
         let first = self.row.len().saturating_sub(7);
         let of = |orders: [usize; 7]| places.iter().zip(orders).all(|(place, order)| *place == first + order);
+        let named =
+            places.iter().skip(3).all(|&place| self.title[place].to_ascii_lowercase().starts_with('q'));
         self.row.len() < 9
+            && named
             && self.row.iter().all(|field| field.parse::<f64>().is_ok())
             && (of([0, 1, 2, 3, 4, 5, 6]) || of([0, 1, 2, 4, 5, 6, 3]))
     }
