@@ -1,10 +1,12 @@
 //! Replays the decisions of an alignment on pairs that were registered before, and scores them against the truth.
 //!
-//!     replay [--edges] [--tolerance DEG LENGTH] FOLDER...
+//!     replay [--edges] [--guesses] [--bound SHARE] [--tolerance DEG LENGTH] FOLDER...
 //!
 //! FOLDER holds scans and `truth.poses`, as the example `scenes` of `srrf-corrupt` writes them; FOLDER.jsonl the pairs, as
 //! `srrf align FOLDER --edges FOLDER.jsonl` keeps them. A pair that is not there counts as one without a pose. Each map is held
-//! against the truth by the scan by which most are right. `--edges` lists each pair that says something.
+//! against the truth by the scan by which most are right. `--edges` lists each pair that says something. `--guesses` takes the pose
+//! in which a pair was chosen for its registration, in place of those that are kept. `--bound` says how many scans hang together by
+//! pairs that share so much: what could be placed at most by one who knew them.
 
 #![allow(clippy::print_stdout, reason = "an example that prints its figures")]
 
@@ -19,7 +21,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use srrf_align::{AlignOptions, Map, PairAnswer, PairStore, RegisterPairs, Scans, align};
 use srrf_cloud::io::CloudFile;
-use srrf_cloud::{PointCloud, Rigid};
+use srrf_cloud::{KnnIndex, PointCloud, Rigid, estimate_normals, spacing_of};
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -41,10 +43,14 @@ struct Scene {
     map_from_scan: Vec<Rigid>,
     pairs: BTreeMap<(usize, usize), PairAnswer>,
     missing: AtomicUsize,
+    guesses: bool,
 }
 
+/// What the registration of a guess says, where guesses are taken as they are.
+const GUESS_PROBABILITY: f64 = 0.8;
+
 impl Scene {
-    fn read(folder: &Path) -> Outcome<Self> {
+    fn read(folder: &Path, guesses: bool) -> Outcome<Self> {
         let mut scene = Self {
             names: Vec::new(),
             clouds: Vec::new(),
@@ -52,6 +58,7 @@ impl Scene {
             map_from_scan: Vec::new(),
             pairs: BTreeMap::new(),
             missing: AtomicUsize::new(0),
+            guesses,
         };
         let mut numbers = BTreeMap::new();
         for line in std::fs::read_to_string(folder.join("truth.poses"))?.lines() {
@@ -69,7 +76,7 @@ impl Scene {
             scene.clouds.push(PointCloud::new(contents.points)?);
             scene.map_from_scan.push(rigid(|r, c| rows[4 * r + c]));
         }
-        let lines = std::fs::read_to_string(folder.with_extension("jsonl"))?;
+        let lines = if guesses { String::new() } else { std::fs::read_to_string(folder.with_extension("jsonl"))? };
         for line in lines.lines() {
             let line: Line = serde_json::from_str(line)?;
             let number = |name: &str| {
@@ -86,6 +93,53 @@ impl Scene {
             }
         }
         Ok(scene)
+    }
+
+    /// The largest sets of scans that pairs join of which one shares so much of its points with the other.
+    fn bound(&self, share: f64) -> Outcome<(usize, Vec<usize>)> {
+        let mut surfaces = Vec::new();
+        for (i, cloud) in self.clouds.iter().enumerate() {
+            let moved: Vec<[f64; 3]> = cloud.points().iter().map(|p| self.map_from_scan[i].apply(p)).collect();
+            let eye = self.eyes[i].map(|e| Vector3::from(self.map_from_scan[i].apply(&e)));
+            let normals: Vec<Vector3<f64>> = estimate_normals(&moved, 12)?
+                .into_iter()
+                .zip(&moved)
+                .map(|(n, p)| {
+                    let n = Vector3::from(n);
+                    if eye.is_some_and(|e| n.dot(&(e - Vector3::from(*p))) < 0.0) { -n } else { n }
+                })
+                .collect();
+            let index = KnnIndex::new(&moved)?;
+            let near = 2.0 * spacing_of(&index);
+            surfaces.push((moved, normals, index, near));
+        }
+        let on = |a: usize, b: usize| {
+            let (points, normals, ..) = &surfaces[a];
+            let (_, theirs, index, near) = &surfaces[b];
+            let lies = |i: &usize| {
+                let (at, squared) = index.nearest(&points[*i]);
+                squared <= near * near && theirs[at].dot(&normals[*i]) > 0.7
+            };
+            let asked: Vec<usize> = (0..points.len()).step_by(8).collect();
+            asked.iter().filter(|i| lies(i)).count() as f64 / asked.len() as f64
+        };
+        let n = self.count();
+        let mut of: Vec<usize> = (0..n).collect();
+        let mut pairs = 0;
+        for a in 0..n {
+            for b in 0..a {
+                if on(a, b).max(on(b, a)) >= share {
+                    pairs += 1;
+                    let (x, y) = (of[a], of[b]);
+                    of.iter_mut().filter(|o| **o == x).for_each(|o| *o = y);
+                }
+            }
+        }
+        let mut sizes = vec![0; n];
+        of.iter().for_each(|o| sizes[*o] += 1);
+        sizes.retain(|s| *s > 0);
+        sizes.sort_unstable_by(|a, b| b.cmp(a));
+        Ok((pairs, sizes))
     }
 
     /// How far a pose of a scan in the frame of another is off: degrees, and how far it moves the mean of the scan.
@@ -135,7 +189,10 @@ impl RegisterPairs for Scene {
         Ok(())
     }
 
-    fn register(&self, _: &PointCloud, (): &(), _: Option<Rigid>) -> Result<PairAnswer, Infallible> {
+    fn register(&self, _: &PointCloud, (): &(), guess: Option<Rigid>) -> Result<PairAnswer, Infallible> {
+        if self.guesses && guess.is_some() {
+            return Ok(PairAnswer { target_from_source: guess, probability: GUESS_PROBABILITY, abstain: false });
+        }
         self.missing.fetch_add(1, Ordering::Relaxed);
         Ok(PairAnswer::NOTHING)
     }
@@ -162,10 +219,12 @@ fn right(scene: &Scene, map: &Map, limits: (f64, f64)) -> Vec<Option<bool>> {
 
 fn main() -> Outcome<()> {
     let mut args = std::env::args().skip(1).peekable();
-    let (mut limits, mut list, mut folders) = ((2.0, 0.3), false, Vec::new());
+    let (mut limits, mut list, mut guesses, mut bound, mut folders) = ((2.0, 0.3), false, false, None, Vec::new());
     while let Some(arg) = args.next() {
         match arg.as_str() {
             "--edges" => list = true,
+            "--guesses" => guesses = true,
+            "--bound" => bound = Some(args.next().ok_or("--bound SHARE")?.parse()?),
             "--tolerance" => {
                 let mut number =
                     || -> Outcome<f64> { Ok(args.next().ok_or("--tolerance DEG LENGTH")?.parse()?) };
@@ -179,7 +238,12 @@ fn main() -> Outcome<()> {
         "scene\tscans\tlargest\tplaced\twrong\twrong_sure\tmaps\tabstain\trivals\ttried\tmissing\tseconds"
     );
     for folder in &folders {
-        let scene = Scene::read(Path::new(folder))?;
+        let scene = Scene::read(Path::new(folder), guesses)?;
+        if let Some(share) = bound {
+            let (pairs, sizes) = scene.bound(share)?;
+            println!("{folder}\tpairs that share {share}: {pairs}\thang together: {sizes:?}");
+            continue;
+        }
         let begun = std::time::Instant::now();
         let map = align(&scene, &scene, &AlignOptions::default(), &scene, &|_| {})?;
         let seconds = begun.elapsed().as_secs_f64();

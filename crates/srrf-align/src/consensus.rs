@@ -1,5 +1,7 @@
 //! Which edges hold: loops, a spanning tree of the likeliest, and an optimum that truncates what contradicts it.
 
+use std::collections::BTreeSet;
+
 use serde::{Serialize, Serializer};
 use srrf_cloud::Rigid;
 
@@ -83,6 +85,8 @@ pub struct EdgeEvidence<'a> {
     pub abstains: &'a [bool],
     /// Whether the user says that the scans overlap.
     pub vouched: &'a [bool],
+    /// Whether the scans show the same whole, so that they may be two of a kind.
+    pub twins: &'a [bool],
     /// Short loops of them.
     pub loops: &'a [EdgeLoop],
     /// Whether a loop that closes says nothing.
@@ -118,7 +122,7 @@ pub fn agree(nodes: usize, edges: &[GraphEdge], known: EdgeEvidence<'_>) -> Cons
         lowered = next;
     }
     let look_alike = lowered <= LOOK_ALIKE;
-    let may_join = joining(&posterior, known, &all, look_alike);
+    let may_join = joining(edges, &posterior, known, &all, look_alike);
     let joins = likelier_right_than_wrong(nodes, edges, &posterior, may_join, known.vouched);
     let likely: Vec<f64> = posterior.iter().zip(&joins).map(|(p, j)| if *j { *p } else { 0.0 }).collect();
     let mut poses = along_tree(nodes, edges, &likely);
@@ -170,8 +174,29 @@ fn confirmed(count: usize, likely: &[f64], loops: &[EdgeLoop]) -> Vec<bool> {
     of
 }
 
-/// Which edges may join scans.
-fn joining(posterior: &[f64], known: EdgeEvidence<'_>, loops: &[EdgeLoop], look_alike: bool) -> Vec<bool> {
+/// For each edge whether its scans fit nowhere else: no other edge of theirs is clean by sight and yet rather wrong, and none of them
+/// has a twin, a scan that shows the same whole: what joins the one would join the other as well.
+fn only_there(edges: &[GraphEdge], posterior: &[f64], known: EdgeEvidence<'_>) -> Vec<bool> {
+    let mut fits_elsewhere = BTreeSet::new();
+    for (e, edge) in edges.iter().enumerate() {
+        let rival = known.prior[e] > 0.0 && known.sight[e] >= 0.0 && posterior[e] < HALF;
+        if rival || known.twins[e] {
+            fits_elsewhere.extend([edge.source, edge.target]);
+        }
+    }
+    let fits = |scan: &usize| fits_elsewhere.contains(scan);
+    edges.iter().map(|edge| !fits(&edge.source) && !fits(&edge.target)).collect()
+}
+
+/// Which edges may join scans. Where places look alike, a pair that no loop confirms joins only scans that fit nowhere else.
+fn joining(
+    edges: &[GraphEdge],
+    posterior: &[f64],
+    known: EdgeEvidence<'_>,
+    loops: &[EdgeLoop],
+    look_alike: bool,
+) -> Vec<bool> {
+    let alone = only_there(edges, posterior, known);
     confirmed(posterior.len(), posterior, loops)
         .into_iter()
         .enumerate()
@@ -179,7 +204,7 @@ fn joining(posterior: &[f64], known: EdgeEvidence<'_>, loops: &[EdgeLoop], look_
             () if confirmed => posterior[e] >= HALF,
             () if known.abstains[e] => false,
             () if known.vouched[e] => posterior[e] >= HALF,
-            () => posterior[e] >= SURE && !look_alike,
+            () => posterior[e] >= SURE && (!look_alike || alone[e]),
         })
         .collect()
 }

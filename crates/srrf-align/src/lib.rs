@@ -15,6 +15,7 @@ mod consensus;
 mod graph;
 mod implied;
 mod joint;
+mod layout;
 mod likeness;
 mod loops;
 mod map;
@@ -32,6 +33,7 @@ mod surface;
 mod trees;
 mod truncated;
 mod trust;
+mod upright;
 mod verify;
 
 pub use align::align;

@@ -6,7 +6,7 @@ use srrf_classical::nearest_descriptors;
 use srrf_cloud::{CloudError, PointCloud, Rigid, farthest_point_sampling, thin_to};
 
 use crate::surface::ScanSurface;
-use crate::verify::verified;
+use crate::verify::{Laid, laid, settled};
 
 /// Points of a scan that are described.
 const DESCRIBED: usize = 1200;
@@ -218,13 +218,30 @@ fn distance(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 
 /// How many words a scan compares before it looks at matches.
 pub const COMPARED: usize = 48;
+/// Of the poses of a pair, so many are refined exactly.
+const SETTLED: usize = 2;
+/// Scans that share less than this by their walls say too little: many poses agree on so little.
+const LEAST_OVERLAP: f64 = 0.25;
+/// Likeness of scans whose walls lie on each other wholly: more than that of any that share points alone.
+const BY_LAYOUT: f64 = 256.0;
 /// Pairs of each scan that are laid on each other for a look.
 const LOOKED_AT: usize = 32;
 /// Up to so many scans, all pairs are compared by their matches.
 pub const ALL_COMPARED: usize = 160;
 
-/// Pairs `(a, b)` with `a < b` and their likeness, the most alike first.
-pub fn likely_pairs(surfaces: &[ScanSurface], digests: &[ScanDigest]) -> Vec<(usize, usize, f64)> {
+/// Two scans that may overlap.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LikelyPair {
+    /// The scans, the lower number first.
+    pub scans: (usize, usize),
+    /// How alike they are: only a comparison with other pairs means something.
+    pub value: f64,
+    /// The second's frame from the first's, both centred; none where nothing told it.
+    pub pose: Option<Rigid>,
+}
+
+/// Pairs and their likeness, the most alike first.
+pub fn likely_pairs(surfaces: &[ScanSurface], digests: &[ScanDigest]) -> Vec<LikelyPair> {
     let n = digests.len();
     let tolerance = if n > 0 { common_size(surfaces) } else { 0.0 };
     let mut pairs: Vec<(usize, usize)> = if n <= ALL_COMPARED {
@@ -247,12 +264,13 @@ pub fn likely_pairs(surfaces: &[ScanSurface], digests: &[ScanDigest]) -> Vec<(us
     let scored: Vec<(usize, usize, Likeness)> =
         pairs.into_par_iter().map(|(a, b)| (a, b, digests[a].likeness(&digests[b], tolerance))).collect();
     let mut sorted = looked_at(surfaces, scored);
-    sorted.sort_by(|a, b| b.2.total_cmp(&a.2).then((a.0, a.1).cmp(&(b.0, b.1))));
+    sorted.retain(|pair| pair.value > 0.0);
+    sorted.sort_by(|a, b| b.value.total_cmp(&a.value).then(a.scans.cmp(&b.scans)));
     sorted
 }
 
 /// The likeness of pairs after a look at how the scans lie on each other: of the best few of each scan; others keep a tenth of theirs.
-fn looked_at(surfaces: &[ScanSurface], mut pairs: Vec<(usize, usize, Likeness)>) -> Vec<(usize, usize, f64)> {
+fn looked_at(surfaces: &[ScanSurface], mut pairs: Vec<(usize, usize, Likeness)>) -> Vec<LikelyPair> {
     pairs.sort_by(|a, b| b.2.value.total_cmp(&a.2.value).then((a.0, a.1).cmp(&(b.0, b.1))));
     let mut count = vec![0; surfaces.len()];
     let look: Vec<bool> = pairs
@@ -267,11 +285,32 @@ fn looked_at(surfaces: &[ScanSurface], mut pairs: Vec<(usize, usize, Likeness)>)
     pairs
         .into_par_iter()
         .zip(look)
-        .map(|((a, b, alike), look)| match alike.other_from_this.filter(|_| look) {
-            Some(pose) => (a, b, alike.value * verified(&surfaces[a], &surfaces[b], &pose)),
-            None => (a, b, 0.1 * alike.value),
+        .map(|((a, b, alike), look)| {
+            let by_points = alike.other_from_this.filter(|_| look);
+            let (found, scale) = match (surfaces[a].layout(), surfaces[b].layout()) {
+                (Some(one), Some(other)) => {
+                    let mut poses = one.poses(other, [&surfaces[a], &surfaces[b]]);
+                    poses.extend(by_points.filter(|pose| one.stands(other, pose)));
+                    (best(&surfaces[a], &surfaces[b], &poses), BY_LAYOUT)
+                }
+                _ => (best(&surfaces[a], &surfaces[b], by_points.as_slice()), alike.value),
+            };
+            let found = found.filter(|laid| scale != BY_LAYOUT || laid.overlap >= LEAST_OVERLAP);
+            LikelyPair {
+                scans: (a, b),
+                value: found.map_or(if scale == BY_LAYOUT { 0.0 } else { 0.1 * alike.value }, |laid| scale * laid.value),
+                pose: found.map(|laid| laid.target_from_source),
+            }
         })
         .collect()
+}
+
+/// The pose in which two scans lie on each other best.
+fn best(source: &ScanSurface, target: &ScanSurface, poses: &[Rigid]) -> Option<Laid> {
+    let mut found: Vec<Laid> = poses.iter().filter_map(|pose| laid(source, target, pose)).collect();
+    found.sort_by(|x, y| y.value.total_cmp(&x.value));
+    let exact = found.iter().take(SETTLED).map(|rough| settled(source, target, rough));
+    exact.max_by(|x, y| x.value.total_cmp(&y.value))
 }
 
 #[cfg(test)]
@@ -301,7 +340,7 @@ mod tests {
         let digests = digests(&surfaces).unwrap();
         let pairs = likely_pairs(&surfaces, &digests);
         assert_eq!(pairs.len(), 66);
-        let first: usize = pairs[..12].iter().filter(|(a, b, _)| a / 3 == b / 3).count();
+        let first: usize = pairs[..12].iter().filter(|p| p.scans.0 / 3 == p.scans.1 / 3).count();
         assert_eq!(first, 12, "{:?}", &pairs[..16]);
         let words = |a: usize, b: usize| digests[a].shared_words(&digests[b]);
         assert!(words(0, 1) > words(0, 4) && (words(3, 3) - 1.0).abs() < 1e-5);

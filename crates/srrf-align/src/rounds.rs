@@ -7,7 +7,7 @@ use srrf_cloud::Rigid;
 
 use crate::consensus::{Consensus, EdgeVerdict, HALF, along_tree, group_of};
 use crate::graph::GraphEdge;
-use crate::likeness::{digests, likely_pairs};
+use crate::likeness::{LikelyPair, digests, likely_pairs};
 use crate::near::overlapping;
 use crate::options::{AlignError, AlignOptions, AlignProgress, AlignStage, PairReason};
 use crate::pair::{RegisterPairs, Scans};
@@ -22,7 +22,7 @@ const GUESSED_OVERLAP: f64 = 0.1;
 /// Loops are closed between scans that share this much in the map so far.
 const LOOP_OVERLAP: f64 = 0.25;
 /// ...and in one that is not confirmed.
-const MAYBE_OVERLAP: f64 = 0.15;
+const MAYBE_OVERLAP: f64 = 0.25;
 /// Pairs of each scan in the first round, besides those of the spanning tree.
 const FIRST: usize = 3;
 const MOST_JOIN_ROUNDS: usize = 8;
@@ -164,6 +164,17 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
         }
     }
 
+    /// A pair that looks alike, from the pose in which it does where the user gives no other.
+    fn likely(&self, pair: &LikelyPair, reason: PairReason) -> Candidate {
+        let (a, b) = pair.scans;
+        let surfaces = self.surfaces();
+        let seen = pair.pose.map(|pose| {
+            shift(&surfaces[b].centre).compose(&pose).compose(&shift(&-surfaces[a].centre))
+        });
+        let candidate = self.candidate(a, b, reason);
+        Candidate { guess: candidate.guess.or(seen), ..candidate }
+    }
+
     /// Pairs whose first guesses overlap.
     fn guessed(&self) -> Vec<Candidate> {
         let guesses: Vec<Option<Rigid>> = self
@@ -184,30 +195,31 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
     }
 
     /// A spanning tree of the pairs most alike, and the best few of each scan.
-    fn first_round(&self, alike: &[(usize, usize, f64)]) -> Vec<Candidate> {
+    fn first_round(&self, alike: &[LikelyPair]) -> Vec<Candidate> {
         let n = self.surfaces().len();
         let mut union = Union::new(n);
         let mut count = vec![0; n];
         let mut chosen = Vec::new();
-        for &(a, b, _) in alike {
+        for pair in alike {
+            let (a, b) = pair.scans;
             let spans = union.join(a, b);
             if spans || count[a] < FIRST || count[b] < FIRST {
                 count[a] += 1;
                 count[b] += 1;
-                chosen.push(self.candidate(a, b, PairReason::Alike));
+                chosen.push(self.likely(pair, PairReason::Alike));
             }
         }
         chosen
     }
 
     /// For each scan outside the largest component, the most alike scan of another component.
-    fn joining(&self, alike: &[(usize, usize, f64)], found: &Consensus) -> Vec<Candidate> {
+    fn joining(&self, alike: &[LikelyPair], found: &Consensus) -> Vec<Candidate> {
         if found.components.len() < 2 {
             return Vec::new();
         }
         let n = self.surfaces().len();
         let group = group_of(n, &found.components);
-        let of: BTreeMap<(usize, usize), f64> = alike.iter().map(|&(a, b, score)| ((a, b), score)).collect();
+        let of: BTreeMap<(usize, usize), f64> = alike.iter().map(|p| (p.scans, p.value)).collect();
         let mut holding: Vec<f64> = self
             .pool
             .tried
@@ -225,7 +237,8 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
         }
         let mut given = vec![0; n];
         let mut chosen = Vec::new();
-        for &(a, b, _) in alike.iter().filter(|p| p.2 >= floor) {
+        for pair in alike.iter().filter(|p| p.value >= floor) {
+            let (a, b) = pair.scans;
             if group[a] == group[b] || self.pool.has(a, b) {
                 continue;
             }
@@ -234,7 +247,7 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
             if asks(a) || asks(b) {
                 given[a] += usize::from(group[a] > 0);
                 given[b] += usize::from(group[b] > 0);
-                chosen.push(self.candidate(a, b, PairReason::Join));
+                chosen.push(self.likely(pair, PairReason::Join));
             }
         }
         chosen

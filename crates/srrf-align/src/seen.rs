@@ -16,6 +16,10 @@ use crate::trust::Sight;
 
 /// A pair that is so much likelier wrong by sight (log odds) says that the way between its scans is wrong.
 const BLOCKS: f64 = -5.0;
+/// Two scans that share so much of both show the same.
+const TWINS: f64 = 0.78;
+/// Points of each scan that are asked.
+const ASKED: usize = 4000;
 /// Longer ways say little about their edges.
 const LONGEST_WAY: usize = 10;
 /// So many times a map is mended by what scanners saw.
@@ -32,12 +36,22 @@ pub fn consensus_of(surfaces: &[ScanSurface], pool: &PairPool) -> Consensus {
         pool.tried.iter().map(|t| t.overlay.as_ref().and_then(|o| o.seen_through)).collect();
     let sight = Sight::learned(&prior, &share);
     let by_sight: Vec<f64> = share.iter().map(|s| s.map_or(0.0, |s| sight.log_ratio(s))).collect();
+    let twins: Vec<bool> = pool
+        .tried
+        .iter()
+        .zip(&by_sight)
+        .map(|(t, sight)| {
+            let shared = t.overlay.as_ref().map_or(0.0, |o| o.overlap_source.min(o.overlap_target));
+            t.prior > 0.0 && shared >= TWINS && *sight > BLOCKS
+        })
+        .collect();
     let mut loops = triangles(surfaces.len(), &edges, &prior);
     loops.par_iter_mut().filter(|l| l.closes() == Some(true)).for_each(|l| {
         if is_implied(surfaces, &edges, l) {
             l.silence();
         }
     });
+    loops.extend(conflicts(surfaces, &edges, &prior, sight));
     let mut round = 0;
     loop {
         let known = EdgeEvidence {
@@ -45,6 +59,7 @@ pub fn consensus_of(surfaces: &[ScanSurface], pool: &PairPool) -> Consensus {
             sight: &by_sight,
             abstains: &abstains,
             vouched: &vouched,
+            twins: &twins,
             loops: &loops,
             implied: &|l| is_implied(surfaces, &edges, l),
         };
@@ -62,6 +77,48 @@ pub fn consensus_of(surfaces: &[ScanSurface], pool: &PairPool) -> Consensus {
         loops.extend(more);
         round += 1;
     }
+}
+
+/// Two pairs of one scan that would lay their other scans on each other so that one saw through the other: not both are right.
+fn conflicts(surfaces: &[ScanSurface], edges: &[GraphEdge], prior: &[f64], sight: Sight) -> Vec<EdgeLoop> {
+    let mut at: Vec<Vec<usize>> = vec![Vec::new(); surfaces.len()];
+    for (number, edge) in edges.iter().enumerate().filter(|(number, _)| prior[*number] > 0.0) {
+        at[edge.source].push(number);
+        at[edge.target].push(number);
+    }
+    let ways: Vec<(usize, usize, usize)> = at
+        .iter()
+        .enumerate()
+        .filter(|(scan, _)| surfaces[*scan].has_sight())
+        .flat_map(|(scan, of)| {
+            of.iter().enumerate().flat_map(move |(i, x)| of[..i].iter().map(move |y| (scan, *x, *y)))
+        })
+        .collect();
+    ways.into_par_iter()
+        .filter_map(|(scan, x, y)| {
+            // The motion into the frame of the scan that both share.
+            let from = |number: usize| {
+                let edge = &edges[number];
+                if edge.target == scan {
+                    (edge.source, edge.target_from_source)
+                } else {
+                    (edge.target, edge.target_from_source.inverse())
+                }
+            };
+            let ((a, scan_from_a), (b, scan_from_b)) = (from(x), from(y));
+            let b_from_a = scan_from_b.inverse().compose(&scan_from_a);
+            let apart = b_from_a.translation.norm() > surfaces[a].reach + surfaces[b].reach;
+            if a == b || apart {
+                return None;
+            }
+            let share = surfaces[b].seen_through(&surfaces[a], &b_from_a, ASKED)?;
+            (sight.log_ratio(share) < BLOCKS).then(|| EdgeLoop {
+                edges: vec![x, y],
+                error: Rigid::identity(),
+                chi_squared: f64::INFINITY,
+            })
+        })
+        .collect()
 }
 
 /// The ways along the map between scans of which one saw through the other: something on them is wrong.
@@ -87,7 +144,7 @@ fn seen_through(
         .filter_map(|(a, b)| {
             let way = tree.way(a, b).filter(|way| (2..=LONGEST_WAY).contains(&way.len()))?;
             let b_from_a = found.poses[b].inverse().compose(&found.poses[a]);
-            let share = surfaces[b].seen_through(&surfaces[a], &b_from_a)?;
+            let share = surfaces[b].seen_through(&surfaces[a], &b_from_a, ASKED)?;
             (sight.log_ratio(share) < BLOCKS).then(|| EdgeLoop {
                 edges: way,
                 error: Rigid::identity(),

@@ -1,49 +1,126 @@
 //! [`SightMap`]: how far a scanner saw each way, and what it saw through.
 //!
 //! Where one scan has a surface, and the other's scanner looked through it, the two do not lie on each other: rooms that look alike
-//! fit each other well, yet their loose things stand elsewhere.
+//! fit each other well, yet their loose things stand elsewhere. What was seen is kept as small planes, so that a thing a hand deep in
+//! front of a wall is told even where the wall is seen aslant.
 
 use nalgebra::Vector3;
-use srrf_cloud::Rigid;
+use srrf_cloud::{CloudError, KnnIndex, Rigid, estimate_normals};
 
 /// Fewest and most rows of the map, with twice as many columns: cells of 7.5 to 2 degrees.
 const ROWS: [usize; 2] = [24, 90];
 /// Points of a cell, if all ways are seen.
 const POINTS_PER_CELL: f64 = 2.0;
+/// Most points that a map is made of.
+const MOST_POINTS: usize = 40_000;
+/// Most planes of a cell.
+const PLANES_PER_CELL: usize = 4;
+const NORMAL_NEIGHBOURS: usize = 12;
 /// Cells of a neighbourhood of nine that must have seen something, its own among them.
-const SEEN_CELLS: usize = 4;
-/// A cell has seen through what lies nearer than this share of its range.
-const NEARER: f64 = 0.93;
+const SEEN_CELLS: usize = 5;
+/// A surface is asked from this cosine of its slant on: edge-on, a scanner hits it by chance.
+const ASLANT: f64 = 0.2;
+/// What was seen may be off its plane by so many times what its neighbours are.
+const ROUGH: f64 = 3.0;
+/// A pose that is right to a fifth of a degree is off by this share of the range.
+const TURN: f64 = 0.004;
+/// Planes that were seen under a smaller cosine are no planes: their range is what was measured, by so much.
+const EDGE_ON: f64 = 0.15;
+const EDGE_ON_SHARE: f64 = 0.2;
+/// A plane says nothing far from its point: its range is within these multiples of the measured one.
+const PLANE_RANGE: [f64; 2] = [0.7, 1.4];
+/// Fewest points that say something.
+const LEAST_ASKED: usize = 30;
 
-/// Ranges by direction from the scanner.
+/// A small plane that was seen.
+#[derive(Debug, Clone, Copy)]
+struct Patch {
+    /// Towards the eye.
+    normal: Vector3<f64>,
+    /// Distance of the eye from the plane.
+    height: f64,
+    range: f64,
+    /// How far off it its neighbours may be.
+    rough: f64,
+}
+
+/// How far the neighbours of each point are off its plane, root mean square, and how far away the farthest is.
+pub fn roughness(index: &KnnIndex, normals: &[[f64; 3]]) -> Vec<(f64, f64)> {
+    let of = |(point, normal): (&[f64; 3], &[f64; 3])| {
+        let near = index.k_nearest(point, NORMAL_NEIGHBOURS);
+        let off = |j: usize| -> f64 { (0..3).map(|c| normal[c] * (index.points()[j][c] - point[c])).sum() };
+        // About the mean: the point itself may be off.
+        let count = near.len().max(1) as f64;
+        let mean = near.iter().map(|(j, _)| off(*j)).sum::<f64>() / count;
+        let squares: f64 = near.iter().map(|(j, _)| (off(*j) - mean).powi(2)).sum();
+        ((squares / count).sqrt(), near.iter().map(|n| n.1).fold(0.0, f64::max).sqrt())
+    };
+    index.points().iter().zip(normals).map(of).collect()
+}
+
+/// What a scanner says of a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Seen {
+    /// It did not look there.
+    Unknown,
+    /// It saw it.
+    There,
+    /// It saw through it.
+    Through,
+    /// Something was before it.
+    Hidden,
+}
+
+/// Planes by direction from the scanner.
 #[derive(Debug, Clone)]
 pub struct SightMap {
     eye: Vector3<f64>,
     rows: usize,
-    /// The least range of each cell, and the most; infinite and zero where nothing was seen.
-    nearest: Vec<f32>,
-    farthest: Vec<f32>,
+    /// Where the patches of each cell begin.
+    begins: Vec<u32>,
+    patches: Vec<Patch>,
 }
 
 impl SightMap {
     /// From the points of a scan and the place of its scanner, both in one frame.
-    pub fn new<'a>(points: impl ExactSizeIterator<Item = &'a [f64; 3]>, eye: Vector3<f64>) -> Self {
+    ///
+    /// # Errors
+    /// [`CloudError`] for fewer than three points.
+    pub fn new(points: &[[f64; 3]], eye: Vector3<f64>) -> Result<Self, CloudError> {
+        let step = points.len().div_ceil(MOST_POINTS).max(1);
+        let points: Vec<[f64; 3]> = points.iter().step_by(step).copied().collect();
+        let normals = estimate_normals(&points, NORMAL_NEIGHBOURS)?;
+        let rough = roughness(&KnnIndex::new(&points)?, &normals);
         let rows = (points.len() as f64 / (2.0 * POINTS_PER_CELL)).sqrt() as usize;
         let rows = rows.clamp(ROWS[0], ROWS[1]);
-        let cells = 2 * rows * rows;
-        let mut map = Self { eye, rows, nearest: vec![f32::INFINITY; cells], farthest: vec![0.0; cells] };
-        for p in points {
-            if let Some((row, column, range)) = map.cell(&Vector3::from(*p)) {
-                let at = 2 * map.rows * row + column;
-                map.nearest[at] = map.nearest[at].min(range as f32);
-                map.farthest[at] = map.farthest[at].max(range as f32);
+        let mut map = Self { eye, rows, begins: Vec::new(), patches: Vec::new() };
+        let mut cells: Vec<Vec<Patch>> = vec![Vec::new(); 2 * rows * rows];
+        for ((p, normal), (off, _)) in points.iter().zip(&normals).zip(&rough) {
+            let ray = Vector3::from(*p) - eye;
+            let Some((row, column, range)) = map.cell(&ray) else { continue };
+            let cell = &mut cells[2 * rows * row + column];
+            if cell.len() < PLANES_PER_CELL {
+                let normal = Vector3::from(*normal);
+                let height = -normal.dot(&ray);
+                let side = if height < 0.0 { -1.0 } else { 1.0 };
+                let rough = ROUGH * off;
+                cell.push(Patch { normal: side * normal, height: side * height, range, rough });
             }
         }
-        map
+        for cell in cells {
+            map.begins.push(map.patches.len() as u32);
+            map.patches.extend(cell);
+        }
+        map.begins.push(map.patches.len() as u32);
+        Ok(map)
     }
 
-    fn cell(&self, point: &Vector3<f64>) -> Option<(usize, usize, f64)> {
-        let ray = point - self.eye;
+    /// The place of the scanner.
+    pub fn eye(&self) -> Vector3<f64> {
+        self.eye
+    }
+
+    fn cell(&self, ray: &Vector3<f64>) -> Option<(usize, usize, f64)> {
         let range = ray.norm();
         if !(range > 0.0 && range.is_finite()) {
             return None;
@@ -55,41 +132,83 @@ impl SightMap {
         Some((row, ((around * columns as f64) as usize).min(columns - 1), range))
     }
 
-    /// The least range around a cell: of it and the cells beside it; none where it saw nothing, or few of them did.
-    fn clear(&self, row: usize, column: usize) -> Option<f64> {
-        let columns = 2 * self.rows;
-        if self.farthest[row * columns + column] == 0.0 {
-            return None;
-        }
-        let (mut least, mut seen) = (f32::INFINITY, 0);
-        for r in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
-            for c in [column + columns - 1, column, column + 1] {
-                let at = r * columns + c % columns;
-                seen += usize::from(self.farthest[at] > 0.0);
-                least = least.min(self.nearest[at]);
-            }
-        }
-        (seen >= SEEN_CELLS).then_some(f64::from(least))
+    fn patches(&self, cell: usize) -> &[Patch] {
+        &self.patches[self.begins[cell] as usize..self.begins[cell + 1] as usize]
     }
 
-    /// Of points (moved by `frame_from_points`) in directions in which this scanner saw something: the share that it saw through, that is,
-    /// that are clearly nearer than all that it saw there. `margin` is a length. None where fewer than 30 points are in such directions.
+    /// What it says of a point with a normal (either way round). `margin` is a length.
+    pub fn look(&self, point: &Vector3<f64>, normal: &Vector3<f64>, margin: f64) -> Seen {
+        let ray = point - self.eye;
+        let Some((row, column, range)) = self.cell(&ray) else { return Seen::Unknown };
+        let way = ray / range;
+        let columns = 2 * self.rows;
+        if normal.dot(&way).abs() < ASLANT || self.patches(row * columns + column).is_empty() {
+            return Seen::Unknown;
+        }
+        let margin = margin + TURN * range;
+        let (mut clear, mut end, mut seen) = (f64::INFINITY, 0.0f64, 0);
+        for r in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
+            for c in [column + columns - 1, column, column + 1] {
+                let patches = self.patches(r * columns + c % columns);
+                seen += usize::from(!patches.is_empty());
+                for patch in patches {
+                    let cosine = -patch.normal.dot(&way);
+                    let (at, less) = if cosine < EDGE_ON {
+                        (patch.range, EDGE_ON_SHARE * patch.range)
+                    } else {
+                        let [low, high] = PLANE_RANGE.map(|share| share * patch.range);
+                        ((patch.height / cosine).clamp(low, high), (margin + patch.rough) / cosine)
+                    };
+                    clear = clear.min(at - less);
+                    end = end.max(at + less);
+                }
+            }
+        }
+        match () {
+            () if seen < SEEN_CELLS => Seen::Unknown,
+            () if range < clear => Seen::Through,
+            () if range <= end => Seen::There,
+            () => Seen::Hidden,
+        }
+    }
+
+    /// The same by the point's own cell alone.
+    pub fn glance(&self, point: &Vector3<f64>, normal: &Vector3<f64>, margin: f64) -> Seen {
+        let ray = point - self.eye;
+        let Some((row, column, range)) = self.cell(&ray) else { return Seen::Unknown };
+        if normal.dot(&ray).abs() < ASLANT * range {
+            return Seen::Unknown;
+        }
+        let (mut clear, mut end) = (f64::INFINITY, 0.0f64);
+        for patch in self.patches(2 * row * self.rows + column) {
+            let cosine = (patch.height / patch.range).max(EDGE_ON);
+            clear = clear.min(patch.range - margin / cosine);
+            end = end.max(patch.range + margin / cosine);
+        }
+        match () {
+            () if end == 0.0 => Seen::Unknown,
+            () if range < clear => Seen::Through,
+            () if range <= end => Seen::There,
+            () => Seen::Hidden,
+        }
+    }
+
+    /// Of points with normals (moved by `frame_from_points`) in directions in which this scanner saw something: the share that it saw
+    /// through, that is, that are clearly nearer than all that it saw there. None where few points are in such directions.
     pub fn seen_through<'a>(
         &self,
-        points: impl Iterator<Item = &'a [f64; 3]>,
+        points: impl Iterator<Item = (&'a [f64; 3], &'a Vector3<f64>)>,
         frame_from_points: &Rigid,
         margin: f64,
     ) -> Option<f64> {
         let (mut asked, mut through) = (0usize, 0usize);
-        for p in points {
+        for (p, normal) in points {
             let moved = Vector3::from(frame_from_points.apply(p));
-            let Some((row, column, range)) = self.cell(&moved) else { continue };
-            if let Some(clear) = self.clear(row, column) {
-                asked += 1;
-                through += usize::from(range < NEARER * clear - margin);
-            }
+            let seen = self.look(&moved, &(frame_from_points.rotation * normal), margin);
+            asked += usize::from(seen != Seen::Unknown);
+            through += usize::from(seen == Seen::Through);
         }
-        (asked >= 30).then(|| through as f64 / asked as f64)
+        (asked >= LEAST_ASKED).then(|| through as f64 / asked as f64)
     }
 }
 
@@ -109,25 +228,52 @@ mod tests {
         points
     }
 
+    fn share(map: &SightMap, points: &[[f64; 3]]) -> Option<f64> {
+        let normals: Vec<Vector3<f64>> = points.iter().map(|p| Vector3::from(*p).normalize()).collect();
+        map.seen_through(points.iter().zip(&normals), &Rigid::identity(), 0.02)
+    }
+
     #[test]
     fn what_stands_in_free_space_is_seen_through_and_what_is_hidden_is_not() {
-        let map = SightMap::new(ball().iter(), Vector3::zeros());
+        let map = SightMap::new(&ball(), Vector3::zeros()).unwrap();
         let half: Vec<[f64; 3]> = ball().iter().map(|p| p.map(|c| 0.5 * c)).collect();
-        let share = |points: &[[f64; 3]]| map.seen_through(points.iter(), &Rigid::identity(), 0.02).unwrap();
-        assert_eq!(share(&half), 1.0);
-        assert_eq!(share(&ball()), 0.0);
+        assert_eq!(share(&map, &half), Some(1.0));
+        assert_eq!(share(&map, &ball()), Some(0.0));
         let behind: Vec<[f64; 3]> = ball().iter().map(|p| p.map(|c| 1.5 * c)).collect();
-        assert_eq!(share(&behind), 0.0);
+        assert_eq!(share(&map, &behind), Some(0.0));
         let mixed: Vec<[f64; 3]> = ball().into_iter().chain(half.into_iter().step_by(9)).collect();
-        assert!((share(&mixed) - 0.1).abs() < 1e-3, "{}", share(&mixed));
+        let found = share(&map, &mixed).unwrap();
+        assert!((found - 0.1).abs() < 1e-3, "{found}");
+    }
+
+    #[test]
+    fn a_thing_a_hand_deep_in_front_of_a_slanting_wall_is_seen_through() {
+        // A wall a metre away that runs along x to 8 metres; what lies on it there is seen under 7 degrees and more.
+        let wall = |depth: f64| {
+            (0..400).flat_map(move |i| {
+                (0..100)
+                    .map(move |j| [-4.0 + 0.02 * f64::from(i), 1.0 - depth, -1.0 + 0.02 * f64::from(j)])
+            })
+        };
+        let map = SightMap::new(&wall(0.0).collect::<Vec<_>>(), Vector3::zeros()).unwrap();
+        let through = |depth: f64| {
+            let points: Vec<[f64; 3]> = wall(depth).filter(|p| p[0] > 2.5 && p[0] < 3.5).collect();
+            map.seen_through(
+                points.iter().zip(&vec![Vector3::y(); points.len()]),
+                &Rigid::identity(),
+                0.03,
+            )
+        };
+        assert_eq!(through(0.01), Some(0.0));
+        assert!(through(0.15).unwrap() > 0.95, "{:?}", through(0.15));
     }
 
     #[test]
     fn ways_that_were_not_looked_say_nothing() {
         let upper: Vec<[f64; 3]> = ball().into_iter().filter(|p| p[2] > 0.0).collect();
-        let map = SightMap::new(upper.iter(), Vector3::zeros());
+        let map = SightMap::new(&upper, Vector3::zeros()).unwrap();
         let below: Vec<[f64; 3]> =
             ball().iter().filter(|p| p[2] < -0.5).map(|p| p.map(|c| 0.5 * c)).collect();
-        assert_eq!(map.seen_through(below.iter(), &Rigid::identity(), 0.02), None);
+        assert_eq!(share(&map, &below), None);
     }
 }

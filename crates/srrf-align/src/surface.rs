@@ -5,19 +5,23 @@ use srrf_cloud::{
     CloudError, KnnIndex, PointCloud, Rigid, estimate_normals, point_spacing, spacing_of, thin_to,
 };
 
+use crate::layout::Layout;
 use crate::se3::shift;
-use crate::sight::SightMap;
+use crate::sight::{SightMap, roughness};
 
 /// Neighbours of a normal.
 const NORMAL_NEIGHBOURS: usize = 12;
+/// Neighbours of a point on an even surface are off its plane by at most this share of their distance.
+const EVEN: f64 = 0.1;
 /// Matches are within so many spacings of the thinned points.
 const NEAR_SPACINGS: f64 = 1.5;
 /// Matched normals differ by less than acos(0.7), 46 degrees, either way round.
 const SAME_NORMAL: f64 = 0.7;
 /// Neighbouring residuals are alike: so many matches count as one.
 pub const ALIKE_MATCHES: f64 = 20.0;
-/// What a scanner saw through lies so many spacings in front of what it saw.
-const SIGHT_SPACINGS: f64 = 3.0;
+/// What a scanner saw through lies by this share of the radius and so many spacings in front of what it saw.
+const SIGHT_RADII: f64 = 0.015;
+const SIGHT_SPACINGS: f64 = 0.25;
 /// Points of a scan that are asked for its matches.
 const ASKED: usize = 1500;
 /// A right registration is within this share of the radius and this many spacings of the truth, three standard deviations.
@@ -37,10 +41,14 @@ pub struct ScanSurface {
     pub spacing: f64,
     index: KnnIndex,
     normals: Vec<Vector3<f64>>,
+    /// Whether the surface around each point is even: at an edge, a normal is of neither side. Empty where the place of the scanner is
+    /// not known.
+    even: Vec<bool>,
     /// The same among the thinned points.
     thin_spacing: f64,
     /// How far its scanner saw, where its place is known.
     sight: Option<SightMap>,
+    layout: Option<Layout>,
 }
 
 /// A point of one scan that lies on the surface of another.
@@ -84,13 +92,32 @@ impl ScanSurface {
         let radius = (centred.iter().map(squared).sum::<f64>() / centred.len() as f64).sqrt();
         let reach = centred.iter().map(squared).fold(0.0, f64::max).sqrt();
         let spacing = point_spacing(&centred)?;
-        let sight = eye.map(|eye| SightMap::new(centred.iter(), Vector3::from(eye) - centre));
+        let sight = eye.map(|eye| SightMap::new(&centred, Vector3::from(eye) - centre)).transpose()?;
         let thin = thin_to(&PointCloud::new(centred)?, most, radius);
-        let normals =
+        let normals: Vec<Vector3<f64>> =
             estimate_normals(thin.points(), NORMAL_NEIGHBOURS)?.into_iter().map(Vector3::from).collect();
         let index = KnnIndex::new(thin.points())?;
+        let mut even = Vec::new();
+        if sight.is_some() {
+            let normals: Vec<[f64; 3]> = normals.iter().map(|n| (*n).into()).collect();
+            even = roughness(&index, &normals).into_iter().map(|(off, around)| off <= EVEN * around).collect();
+        }
         let thin_spacing = spacing_of(&index);
-        Ok(Self { centre, radius, reach, spacing, index, normals, thin_spacing, sight })
+        let layout = None;
+        let mut surface = Self { centre, radius, reach, spacing, index, normals, even, thin_spacing, sight, layout };
+        surface.layout = Layout::new(&surface);
+        Ok(surface)
+    }
+
+    /// Its walls, where the place of its scanner is known.
+    pub fn layout(&self) -> Option<&Layout> {
+        self.layout.as_ref()
+    }
+
+    /// Whether a pose leaves what is up in both scans up; true where that is not known.
+    pub fn stands(&self, source: &Self, self_from_source: &Rigid) -> bool {
+        let both = source.layout().zip(self.layout());
+        both.is_none_or(|(from, to)| from.stands(to, self_from_source))
     }
 
     /// Whether the place of its scanner is known.
@@ -198,25 +225,44 @@ impl ScanSurface {
         Overlay {
             overlap_source: onto.len() as f64 / asked.max(1) as f64,
             overlap_target: back.len() as f64 / asked_back.max(1) as f64,
-            seen_through: self.seen_through(source, self_from_source),
+            seen_through: self.seen_through(source, self_from_source, usize::MAX),
             rms,
             information: self.with_floor(source, &(hessian / (ALIKE_MATCHES * sigma * sigma))),
         }
     }
 
-    /// The share of the points of one that the scanner of the other saw through, the larger of both.
-    pub fn seen_through(&self, source: &Self, self_from_source: &Rigid) -> Option<f64> {
-        let margin = SIGHT_SPACINGS * self.spacing.max(source.spacing);
-        let own = self
-            .sight
-            .as_ref()
-            .and_then(|s| s.seen_through(source.points().iter(), self_from_source, margin));
-        let back = self_from_source.inverse();
-        let other = source.sight.as_ref().and_then(|s| s.seen_through(self.points().iter(), &back, margin));
+    /// How far before what a scanner saw a point lies that it saw through.
+    pub fn sight_margin(&self, source: &Self) -> f64 {
+        SIGHT_RADII * self.radius.max(source.radius) + SIGHT_SPACINGS * self.spacing.max(source.spacing)
+    }
+
+    /// The thinned points with their normals.
+    pub fn with_normals(&self) -> impl Iterator<Item = (&[f64; 3], &Vector3<f64>)> {
+        self.points().iter().zip(&self.normals)
+    }
+
+    fn even_points(&self) -> impl Iterator<Item = (&[f64; 3], &Vector3<f64>)> {
+        self.with_normals().zip(&self.even).filter(|(_, even)| **even).map(|(point, _)| point)
+    }
+
+    /// The share of the points of one that the scanner of the other saw through, the larger of both. `most` points are asked each way.
+    pub fn seen_through(&self, source: &Self, self_from_source: &Rigid, most: usize) -> Option<f64> {
+        let margin = self.sight_margin(source);
+        let share = |of: &Self, by: &Self, motion: &Rigid| {
+            let step = of.points().len().div_ceil(most.max(1)).max(1);
+            by.sight.as_ref().and_then(|s| s.seen_through(of.even_points().step_by(step), motion, margin))
+        };
+        let (own, other) =
+            (share(source, self, self_from_source), share(self, source, &self_from_source.inverse()));
         match (own, other) {
             (Some(a), Some(b)) => Some(a.max(b)),
             (one, other) => one.or(other),
         }
+    }
+
+    /// How far its scanner saw, where its place is known.
+    pub fn sight(&self) -> Option<&SightMap> {
+        self.sight.as_ref()
     }
 
     /// The information of a registration: no better than the tolerance, and no worse than the size of the scans.

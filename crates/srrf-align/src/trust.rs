@@ -7,8 +7,8 @@
 /// Share of points that scanners see through of what is there, as long as nothing else is known: things move, edges are thick. Scans
 /// may show that it is less, never that it is more: where most pairs are wrong, what is usual among them says nothing.
 const USUAL: f64 = 0.002;
-/// A point in 5,000.
-const LEAST: f64 = 2e-4;
+/// A point in 50,000.
+const LEAST: f64 = 2e-5;
 /// How many pairs that counts for.
 const USUAL_WORTH: f64 = 1.0;
 /// How many sure pairs are right before any is asked.

@@ -15,6 +15,7 @@ fn agreed(nodes: usize, edges: &[GraphEdge], prior: &[f64], abstains: &[bool]) -
         EdgeEvidence {
             prior,
             sight: &sight,
+            twins: &vec![false; edges.len()],
             abstains,
             vouched: &vouched,
             loops: &loops,
@@ -124,6 +125,7 @@ fn a_map_is_one_as_long_as_it_is_likelier_right_than_wrong() {
     let known = EdgeEvidence {
         prior: &prior,
         sight: &sight,
+        twins: &[false; 64],
         abstains: &none,
         vouched: &vouched,
         loops: &[],
@@ -148,6 +150,7 @@ fn what_scanners_saw_breaks_a_map() {
     let known = EdgeEvidence {
         prior: &prior,
         sight: &[0.0; 7],
+        twins: &[false; 7],
         abstains: &[false; 7],
         vouched: &[false; 7],
         loops: &loops,
