@@ -76,7 +76,8 @@ impl Scene {
             scene.clouds.push(PointCloud::new(contents.points)?);
             scene.map_from_scan.push(rigid(|r, c| rows[4 * r + c]));
         }
-        let lines = if guesses { String::new() } else { std::fs::read_to_string(folder.with_extension("jsonl"))? };
+        let lines =
+            if guesses { String::new() } else { std::fs::read_to_string(folder.with_extension("jsonl"))? };
         for line in lines.lines() {
             let line: Line = serde_json::from_str(line)?;
             let number = |name: &str| {
@@ -99,7 +100,8 @@ impl Scene {
     fn bound(&self, share: f64) -> Outcome<(usize, Vec<usize>)> {
         let mut surfaces = Vec::new();
         for (i, cloud) in self.clouds.iter().enumerate() {
-            let moved: Vec<[f64; 3]> = cloud.points().iter().map(|p| self.map_from_scan[i].apply(p)).collect();
+            let moved: Vec<[f64; 3]> =
+                cloud.points().iter().map(|p| self.map_from_scan[i].apply(p)).collect();
             let eye = self.eyes[i].map(|e| Vector3::from(self.map_from_scan[i].apply(&e)));
             let normals: Vec<Vector3<f64>> = estimate_normals(&moved, 12)?
                 .into_iter()
@@ -191,7 +193,11 @@ impl RegisterPairs for Scene {
 
     fn register(&self, _: &PointCloud, (): &(), guess: Option<Rigid>) -> Result<PairAnswer, Infallible> {
         if self.guesses && guess.is_some() {
-            return Ok(PairAnswer { target_from_source: guess, probability: GUESS_PROBABILITY, abstain: false });
+            return Ok(PairAnswer {
+                target_from_source: guess,
+                probability: GUESS_PROBABILITY,
+                abstain: false,
+            });
         }
         self.missing.fetch_add(1, Ordering::Relaxed);
         Ok(PairAnswer::NOTHING)
@@ -219,7 +225,8 @@ fn right(scene: &Scene, map: &Map, limits: (f64, f64)) -> Vec<Option<bool>> {
 
 fn main() -> Outcome<()> {
     let mut args = std::env::args().skip(1).peekable();
-    let (mut limits, mut list, mut guesses, mut bound, mut folders) = ((2.0, 0.3), false, false, None, Vec::new());
+    let (mut limits, mut list, mut guesses, mut bound, mut folders) =
+        ((2.0, 0.3), false, false, None, Vec::new());
     while let Some(arg) = args.next() {
         match arg.as_str() {
             "--edges" => list = true,

@@ -193,8 +193,9 @@ impl Layout {
                 let same = their.toward.dot(&axis);
                 if same.abs() > ONE_WAY {
                     for (a, wide) in &mine.levels {
-                        votes
-                            .extend(their.levels.iter().map(|(b, w)| ((b - a) * same.signum(), w.min(*wide))));
+                        votes.extend(
+                            their.levels.iter().map(|(b, w)| ((b - a) * same.signum(), w.min(*wide))),
+                        );
                     }
                 }
             }
@@ -247,8 +248,7 @@ fn cosine_between(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
 fn commonest(left: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Vector3<f64>> {
     let step = left.len().div_ceil(SEEDS).max(1);
     let near = |way: &Vector3<f64>| left.iter().filter(|(_, n)| n.dot(way) > ONE_WAY).count();
-    let (mut way, _) =
-        left.iter().step_by(step).map(|(_, n)| (*n, near(n))).max_by(|a, b| a.1.cmp(&b.1))?;
+    let (mut way, _) = left.iter().step_by(step).map(|(_, n)| (*n, near(n))).max_by(|a, b| a.1.cmp(&b.1))?;
     for _ in 0..3 {
         let sum: Vector3<f64> = left.iter().map(|(_, n)| n).filter(|n| n.dot(&way) > ONE_WAY).sum();
         way = sum.try_normalize(1e-9)?;

@@ -264,12 +264,12 @@ pub fn likely_pairs(surfaces: &[ScanSurface], digests: &[ScanDigest]) -> Vec<Lik
     let scored: Vec<(usize, usize, Likeness)> =
         pairs.into_par_iter().map(|(a, b)| (a, b, digests[a].likeness(&digests[b], tolerance))).collect();
     let mut sorted = looked_at(surfaces, scored);
-    sorted.retain(|pair| pair.value > 0.0);
     sorted.sort_by(|a, b| b.value.total_cmp(&a.value).then(a.scans.cmp(&b.scans)));
     sorted
 }
 
 /// The likeness of pairs after a look at how the scans lie on each other: of the best few of each scan; others keep a tenth of theirs.
+/// Scans with walls of which no pose fits are no pair.
 fn looked_at(surfaces: &[ScanSurface], mut pairs: Vec<(usize, usize, Likeness)>) -> Vec<LikelyPair> {
     pairs.sort_by(|a, b| b.2.value.total_cmp(&a.2.value).then((a.0, a.1).cmp(&(b.0, b.1))));
     let mut count = vec![0; surfaces.len()];
@@ -285,22 +285,22 @@ fn looked_at(surfaces: &[ScanSurface], mut pairs: Vec<(usize, usize, Likeness)>)
     pairs
         .into_par_iter()
         .zip(look)
-        .map(|((a, b, alike), look)| {
+        .filter_map(|((a, b, alike), look)| {
             let by_points = alike.other_from_this.filter(|_| look);
-            let (found, scale) = match (surfaces[a].layout(), surfaces[b].layout()) {
-                (Some(one), Some(other)) => {
-                    let mut poses = one.poses(other, [&surfaces[a], &surfaces[b]]);
-                    poses.extend(by_points.filter(|pose| one.stands(other, pose)));
-                    (best(&surfaces[a], &surfaces[b], &poses), BY_LAYOUT)
+            let (one, other) = (&surfaces[a], &surfaces[b]);
+            let (value, found) = match (one.layout(), other.layout()) {
+                (Some(from), Some(to)) => {
+                    let mut poses = from.poses(to, [one, other]);
+                    poses.extend(by_points.filter(|pose| from.stands(to, pose)));
+                    let found = best(one, other, &poses).filter(|laid| laid.overlap >= LEAST_OVERLAP)?;
+                    (BY_LAYOUT * found.value, Some(found))
                 }
-                _ => (best(&surfaces[a], &surfaces[b], by_points.as_slice()), alike.value),
+                _ => match best(one, other, by_points.as_slice()) {
+                    Some(found) => (alike.value * found.value, Some(found)),
+                    None => (0.1 * alike.value, None),
+                },
             };
-            let found = found.filter(|laid| scale != BY_LAYOUT || laid.overlap >= LEAST_OVERLAP);
-            LikelyPair {
-                scans: (a, b),
-                value: found.map_or(if scale == BY_LAYOUT { 0.0 } else { 0.1 * alike.value }, |laid| scale * laid.value),
-                pose: found.map(|laid| laid.target_from_source),
-            }
+            Some(LikelyPair { scans: (a, b), value, pose: found.map(|laid| laid.target_from_source) })
         })
         .collect()
 }

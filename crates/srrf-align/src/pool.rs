@@ -197,7 +197,8 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Workplace<'_, S, R> {
         let centred = answer.target_from_source.map(|pose| fixed.centred(moving, &pose));
         let overlay = centred.map(|pose| fixed.overlay(moving, &pose));
         let stands = centred.is_none_or(|pose| fixed.stands(moving, &pose));
-        let lies = stands && overlay.as_ref().is_some_and(|o| o.overlap_source.max(o.overlap_target) >= LEAST_OVERLAP);
+        let lies = stands
+            && overlay.as_ref().is_some_and(|o| o.overlap_source.max(o.overlap_target) >= LEAST_OVERLAP);
         let edge = GraphEdge {
             source,
             target,

@@ -168,9 +168,9 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
     fn likely(&self, pair: &LikelyPair, reason: PairReason) -> Candidate {
         let (a, b) = pair.scans;
         let surfaces = self.surfaces();
-        let seen = pair.pose.map(|pose| {
-            shift(&surfaces[b].centre).compose(&pose).compose(&shift(&-surfaces[a].centre))
-        });
+        let seen = pair
+            .pose
+            .map(|pose| shift(&surfaces[b].centre).compose(&pose).compose(&shift(&-surfaces[a].centre)));
         let candidate = self.candidate(a, b, reason);
         Candidate { guess: candidate.guess.or(seen), ..candidate }
     }

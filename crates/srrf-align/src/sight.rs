@@ -251,18 +251,13 @@ mod tests {
         // A wall a metre away that runs along x to 8 metres; what lies on it there is seen under 7 degrees and more.
         let wall = |depth: f64| {
             (0..400).flat_map(move |i| {
-                (0..100)
-                    .map(move |j| [-4.0 + 0.02 * f64::from(i), 1.0 - depth, -1.0 + 0.02 * f64::from(j)])
+                (0..100).map(move |j| [-4.0 + 0.02 * f64::from(i), 1.0 - depth, -1.0 + 0.02 * f64::from(j)])
             })
         };
         let map = SightMap::new(&wall(0.0).collect::<Vec<_>>(), Vector3::zeros()).unwrap();
         let through = |depth: f64| {
             let points: Vec<[f64; 3]> = wall(depth).filter(|p| p[0] > 2.5 && p[0] < 3.5).collect();
-            map.seen_through(
-                points.iter().zip(&vec![Vector3::y(); points.len()]),
-                &Rigid::identity(),
-                0.03,
-            )
+            map.seen_through(points.iter().zip(&vec![Vector3::y(); points.len()]), &Rigid::identity(), 0.03)
         };
         assert_eq!(through(0.01), Some(0.0));
         assert!(through(0.15).unwrap() > 0.95, "{:?}", through(0.15));

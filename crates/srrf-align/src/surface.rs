@@ -100,11 +100,13 @@ impl ScanSurface {
         let mut even = Vec::new();
         if sight.is_some() {
             let normals: Vec<[f64; 3]> = normals.iter().map(|n| (*n).into()).collect();
-            even = roughness(&index, &normals).into_iter().map(|(off, around)| off <= EVEN * around).collect();
+            even =
+                roughness(&index, &normals).into_iter().map(|(off, around)| off <= EVEN * around).collect();
         }
         let thin_spacing = spacing_of(&index);
         let layout = None;
-        let mut surface = Self { centre, radius, reach, spacing, index, normals, even, thin_spacing, sight, layout };
+        let mut surface =
+            Self { centre, radius, reach, spacing, index, normals, even, thin_spacing, sight, layout };
         surface.layout = Layout::new(&surface);
         Ok(surface)
     }

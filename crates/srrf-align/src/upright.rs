@@ -23,7 +23,11 @@ const FLAT: f64 = 0.978;
 const TILT: f64 = 0.966;
 
 /// Up, as a unit vector; none where no hole says. `normals` point to the eye, `ways` are the directions that may be up.
-pub fn upward(points: &[(Vector3<f64>, Vector3<f64>)], eye: &Vector3<f64>, ways: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+pub fn upward(
+    points: &[(Vector3<f64>, Vector3<f64>)],
+    eye: &Vector3<f64>,
+    ways: &[Vector3<f64>],
+) -> Option<Vector3<f64>> {
     let mut holes: Vec<(f64, Vector3<f64>)> =
         ways.iter().filter_map(|way| Some((hole(points, eye, way)?, *way))).collect();
     holes.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -33,7 +37,11 @@ pub fn upward(points: &[(Vector3<f64>, Vector3<f64>)], eye: &Vector3<f64>, ways:
 }
 
 /// Whether a rotation keeps what is up in both up; true where that is not known.
-pub fn stands(up: Option<Vector3<f64>>, other: Option<Vector3<f64>>, other_from_this: &nalgebra::Matrix3<f64>) -> bool {
+pub fn stands(
+    up: Option<Vector3<f64>>,
+    other: Option<Vector3<f64>>,
+    other_from_this: &nalgebra::Matrix3<f64>,
+) -> bool {
     match (up, other) {
         (Some(up), Some(other)) => (other_from_this * up).dot(&other) > TILT,
         _ => true,
@@ -42,7 +50,8 @@ pub fn stands(up: Option<Vector3<f64>>, other: Option<Vector3<f64>>, other_from_
 
 /// Half angle in degrees of the hole under the eye in what faces `up`; none where it is not round.
 fn hole(points: &[(Vector3<f64>, Vector3<f64>)], eye: &Vector3<f64>, up: &Vector3<f64>) -> Option<f64> {
-    let across = up.cross(&Vector3::x()).try_normalize(0.1).or_else(|| up.cross(&Vector3::y()).try_normalize(0.1))?;
+    let across =
+        up.cross(&Vector3::x()).try_normalize(0.1).or_else(|| up.cross(&Vector3::y()).try_normalize(0.1))?;
     let aside = up.cross(&across);
     let (mut edge, mut angles) = ([f64::INFINITY; SECTORS], Vec::new());
     for (point, normal) in points {

@@ -52,7 +52,13 @@ pub fn settled(source: &ScanSurface, target: &ScanSurface, rough: &Laid) -> Laid
 }
 
 /// A step of point to plane between points that are within `gate` times the usual distance.
-fn stepped(source: &ScanSurface, target: &ScanSurface, pose: &Rigid, gate: f64, asked: usize) -> Option<Rigid> {
+fn stepped(
+    source: &ScanSurface,
+    target: &ScanSurface,
+    pose: &Rigid,
+    gate: f64,
+    asked: usize,
+) -> Option<Rigid> {
     let (matches, _) = target.matches(source, pose, gate * target.near(source), asked);
     let mut hessian = nalgebra::Matrix6::identity() * 1e-9;
     let mut gradient = nalgebra::Vector6::zeros();
