@@ -8,7 +8,6 @@ use nalgebra::{Matrix3, Vector3};
 use srrf_cloud::Rigid;
 
 use crate::sight::{Seen, SightMap};
-use crate::surface::ScanSurface;
 use crate::upright::{stands, upward};
 
 /// Most directions of a scan, and the least share of its points that look one way.
@@ -59,11 +58,13 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Of a scan with a known place of its scanner.
-    pub fn new(surface: &ScanSurface) -> Option<Self> {
-        let eye = surface.sight()?.eye();
-        let mut left: Vec<(Vector3<f64>, Vector3<f64>)> = surface
-            .with_normals()
+    /// Of the points of a scan with their normals, and the place of its scanner. Walls are so thick as `width`.
+    pub fn new<'a>(
+        points: impl Iterator<Item = (&'a [f64; 3], &'a Vector3<f64>)>,
+        eye: &Vector3<f64>,
+        width: f64,
+    ) -> Self {
+        let mut left: Vec<(Vector3<f64>, Vector3<f64>)> = points
             .map(|(p, n)| {
                 let p = Vector3::from(*p);
                 (p, if n.dot(&(eye - p)) < 0.0 { -n } else { *n })
@@ -72,7 +73,6 @@ impl Layout {
         let all = left.len();
         let whole = left.clone();
         let probes = left.iter().step_by(all.div_ceil(PROBES).max(1)).copied().collect();
-        let width = surface.sight_margin(surface);
         let mut faces = Vec::new();
         while faces.len() < MOST_FACES {
             let Some(toward) = commonest(&left) else { break };
@@ -86,7 +86,7 @@ impl Layout {
             left = rest;
         }
         let ways: Vec<Vector3<f64>> = faces.iter().take(TELLING).map(|f: &Face| f.toward).collect();
-        Some(Self { faces, up: upward(&whole, &eye, &ways), probes })
+        Self { faces, up: upward(&whole, eye, &ways), probes }
     }
 
     /// Whether a pose keeps up what is up, as far as both scans tell.
@@ -95,16 +95,14 @@ impl Layout {
     }
 
     /// Poses `other_from_self` in which walls lie on walls and the scanners saw little through, the best first.
-    pub fn poses(&self, other: &Self, surfaces: [&ScanSurface; 2]) -> Vec<Rigid> {
-        let [own, target] = surfaces;
-        let margin = own.sight_margin(target);
+    /// `sights` are those of this scan and the other.
+    pub fn poses(&self, other: &Self, sights: [&SightMap; 2], margin: f64) -> Vec<Rigid> {
         let mut found: Vec<(f64, Rigid)> = Vec::new();
-        let (Some(by_own), Some(by_target)) = (own.sight(), target.sight()) else { return Vec::new() };
         for rotation in self.rotations(other) {
             let Some(shifts) = self.shifts(other, &rotation, margin) else { continue };
             for translation in shifts {
                 let pose = Rigid { rotation, translation };
-                if let Some(score) = self.glance(other, &pose, [by_own, by_target], 2.0 * margin) {
+                if let Some(score) = self.glance(other, &pose, sights, 2.0 * margin) {
                     found.push((score, pose));
                 }
             }

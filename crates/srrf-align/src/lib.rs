@@ -12,6 +12,7 @@
 mod align;
 mod belief;
 mod consensus;
+mod evenness;
 mod graph;
 mod implied;
 mod joint;

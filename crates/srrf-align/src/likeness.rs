@@ -288,14 +288,13 @@ fn looked_at(surfaces: &[ScanSurface], mut pairs: Vec<(usize, usize, Likeness)>)
         .filter_map(|((a, b, alike), look)| {
             let by_points = alike.other_from_this.filter(|_| look);
             let (one, other) = (&surfaces[a], &surfaces[b]);
-            let (value, found) = match (one.layout(), other.layout()) {
-                (Some(from), Some(to)) => {
-                    let mut poses = from.poses(to, [one, other]);
-                    poses.extend(by_points.filter(|pose| from.stands(to, pose)));
+            let (value, found) = match other.poses_by_walls(one) {
+                Some(mut poses) => {
+                    poses.extend(by_points.filter(|pose| other.stands(one, pose)));
                     let found = best(one, other, &poses).filter(|laid| laid.overlap >= LEAST_OVERLAP)?;
                     (BY_LAYOUT * found.value, Some(found))
                 }
-                _ => match best(one, other, by_points.as_slice()) {
+                None => match best(one, other, by_points.as_slice()) {
                     Some(found) => (alike.value * found.value, Some(found)),
                     None => (0.1 * alike.value, None),
                 },

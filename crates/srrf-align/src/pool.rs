@@ -196,6 +196,11 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Workplace<'_, S, R> {
         let (moving, fixed) = (&self.surfaces[source], &self.surfaces[target]);
         let centred = answer.target_from_source.map(|pose| fixed.centred(moving, &pose));
         let overlay = centred.map(|pose| fixed.overlay(moving, &pose));
+        if std::env::var("SRRF_DUMP").is_ok()
+            && let Some(pose) = &centred
+        {
+            fixed.dump(moving, pose, source, target);
+        }
         let stands = centred.is_none_or(|pose| fixed.stands(moving, &pose));
         let lies = stands
             && overlay.as_ref().is_some_and(|o| o.overlap_source.max(o.overlap_target) >= LEAST_OVERLAP);

@@ -7,6 +7,8 @@
 use nalgebra::Vector3;
 use srrf_cloud::{CloudError, KnnIndex, Rigid, estimate_normals};
 
+use crate::evenness::{NEIGHBOURS, evenness};
+
 /// Fewest and most rows of the map, with twice as many columns: cells of 7.5 to 2 degrees.
 const ROWS: [usize; 2] = [24, 90];
 /// Points of a cell, if all ways are seen.
@@ -15,7 +17,6 @@ const POINTS_PER_CELL: f64 = 2.0;
 const MOST_POINTS: usize = 40_000;
 /// Most planes of a cell.
 const PLANES_PER_CELL: usize = 4;
-const NORMAL_NEIGHBOURS: usize = 12;
 /// Cells of a neighbourhood of nine that must have seen something, its own among them.
 const SEEN_CELLS: usize = 5;
 /// A surface is asked from this cosine of its slant on: edge-on, a scanner hits it by chance.
@@ -29,6 +30,8 @@ const EDGE_ON: f64 = 0.15;
 const EDGE_ON_SHARE: f64 = 0.2;
 /// A plane says nothing far from its point: its range is within these multiples of the measured one.
 const PLANE_RANGE: [f64; 2] = [0.7, 1.4];
+/// A surface is asked where it goes on to all sides by so many steps between the rays: a narrow one falls between them.
+const BROAD: f64 = 1.0;
 /// Fewest points that say something.
 const LEAST_ASKED: usize = 30;
 
@@ -44,18 +47,13 @@ struct Patch {
     rough: f64,
 }
 
-/// How far the neighbours of each point are off its plane, root mean square, and how far away the farthest is.
-pub fn roughness(index: &KnnIndex, normals: &[[f64; 3]]) -> Vec<(f64, f64)> {
-    let of = |(point, normal): (&[f64; 3], &[f64; 3])| {
-        let near = index.k_nearest(point, NORMAL_NEIGHBOURS);
-        let off = |j: usize| -> f64 { (0..3).map(|c| normal[c] * (index.points()[j][c] - point[c])).sum() };
-        // About the mean: the point itself may be off.
-        let count = near.len().max(1) as f64;
-        let mean = near.iter().map(|(j, _)| off(*j)).sum::<f64>() / count;
-        let squares: f64 = near.iter().map(|(j, _)| (off(*j) - mean).powi(2)).sum();
-        ((squares / count).sqrt(), near.iter().map(|n| n.1).fold(0.0, f64::max).sqrt())
-    };
-    index.points().iter().zip(normals).map(of).collect()
+/// A place on a surface that a scanner is asked about.
+#[derive(Debug, Clone, Copy)]
+pub struct Asked<'a> {
+    pub point: &'a [f64; 3],
+    pub normal: &'a Vector3<f64>,
+    /// How far the surface goes on to the nearest side.
+    pub breadth: f64,
 }
 
 /// What a scanner says of a point.
@@ -89,13 +87,13 @@ impl SightMap {
     pub fn new(points: &[[f64; 3]], eye: Vector3<f64>) -> Result<Self, CloudError> {
         let step = points.len().div_ceil(MOST_POINTS).max(1);
         let points: Vec<[f64; 3]> = points.iter().step_by(step).copied().collect();
-        let normals = estimate_normals(&points, NORMAL_NEIGHBOURS)?;
-        let rough = roughness(&KnnIndex::new(&points)?, &normals);
+        let normals = estimate_normals(&points, NEIGHBOURS)?;
+        let around = evenness(&KnnIndex::new(&points)?, &normals);
         let rows = (points.len() as f64 / (2.0 * POINTS_PER_CELL)).sqrt() as usize;
         let rows = rows.clamp(ROWS[0], ROWS[1]);
         let mut map = Self { eye, rows, begins: Vec::new(), patches: Vec::new() };
         let mut cells: Vec<Vec<Patch>> = vec![Vec::new(); 2 * rows * rows];
-        for ((p, normal), (off, _)) in points.iter().zip(&normals).zip(&rough) {
+        for ((p, normal), around) in points.iter().zip(&normals).zip(&around) {
             let ray = Vector3::from(*p) - eye;
             let Some((row, column, range)) = map.cell(&ray) else { continue };
             let cell = &mut cells[2 * rows * row + column];
@@ -103,7 +101,7 @@ impl SightMap {
                 let normal = Vector3::from(*normal);
                 let height = -normal.dot(&ray);
                 let side = if height < 0.0 { -1.0 } else { 1.0 };
-                let rough = ROUGH * off;
+                let rough = ROUGH * around.off;
                 cell.push(Patch { normal: side * normal, height: side * height, range, rough });
             }
         }
@@ -136,13 +134,20 @@ impl SightMap {
         &self.patches[self.begins[cell] as usize..self.begins[cell + 1] as usize]
     }
 
-    /// What it says of a point with a normal (either way round). `margin` is a length.
-    pub fn look(&self, point: &Vector3<f64>, normal: &Vector3<f64>, margin: f64) -> Seen {
+    /// Angle between neighbouring rays, radians.
+    fn step(&self) -> f64 {
+        std::f64::consts::PI / (self.rows as f64 * POINTS_PER_CELL.sqrt())
+    }
+
+    /// What it says of a point with a normal (either way round) on a surface so broad. `margin` is a length.
+    pub fn look(&self, point: &Vector3<f64>, normal: &Vector3<f64>, breadth: f64, margin: f64) -> Seen {
         let ray = point - self.eye;
         let Some((row, column, range)) = self.cell(&ray) else { return Seen::Unknown };
         let way = ray / range;
         let columns = 2 * self.rows;
-        if normal.dot(&way).abs() < ASLANT || self.patches(row * columns + column).is_empty() {
+        let slope = normal.dot(&way).abs();
+        let narrow = breadth * slope < BROAD * self.step() * range;
+        if slope < ASLANT || narrow || self.patches(row * columns + column).is_empty() {
             return Seen::Unknown;
         }
         let margin = margin + TURN * range;
@@ -193,18 +198,18 @@ impl SightMap {
         }
     }
 
-    /// Of points with normals (moved by `frame_from_points`) in directions in which this scanner saw something: the share that it saw
+    /// Of places (moved by `frame_from_points`) in directions in which this scanner saw something: the share that it saw
     /// through, that is, that are clearly nearer than all that it saw there. None where few points are in such directions.
     pub fn seen_through<'a>(
         &self,
-        points: impl Iterator<Item = (&'a [f64; 3], &'a Vector3<f64>)>,
+        points: impl Iterator<Item = Asked<'a>>,
         frame_from_points: &Rigid,
         margin: f64,
     ) -> Option<f64> {
         let (mut asked, mut through) = (0usize, 0usize);
-        for (p, normal) in points {
-            let moved = Vector3::from(frame_from_points.apply(p));
-            let seen = self.look(&moved, &(frame_from_points.rotation * normal), margin);
+        for Asked { point, normal, breadth } in points {
+            let moved = Vector3::from(frame_from_points.apply(point));
+            let seen = self.look(&moved, &(frame_from_points.rotation * normal), breadth, margin);
             asked += usize::from(seen != Seen::Unknown);
             through += usize::from(seen == Seen::Through);
         }
@@ -230,7 +235,8 @@ mod tests {
 
     fn share(map: &SightMap, points: &[[f64; 3]]) -> Option<f64> {
         let normals: Vec<Vector3<f64>> = points.iter().map(|p| Vector3::from(*p).normalize()).collect();
-        map.seen_through(points.iter().zip(&normals), &Rigid::identity(), 0.02)
+        let asked = points.iter().zip(&normals).map(|(point, normal)| Asked { point, normal, breadth: 0.1 });
+        map.seen_through(asked, &Rigid::identity(), 0.02)
     }
 
     #[test]
@@ -257,7 +263,9 @@ mod tests {
         let map = SightMap::new(&wall(0.0).collect::<Vec<_>>(), Vector3::zeros()).unwrap();
         let through = |depth: f64| {
             let points: Vec<[f64; 3]> = wall(depth).filter(|p| p[0] > 2.5 && p[0] < 3.5).collect();
-            map.seen_through(points.iter().zip(&vec![Vector3::y(); points.len()]), &Rigid::identity(), 0.03)
+            let normal = Vector3::y();
+            let asked = points.iter().map(|point| Asked { point, normal: &normal, breadth: 0.5 });
+            map.seen_through(asked, &Rigid::identity(), 0.03)
         };
         assert_eq!(through(0.01), Some(0.0));
         assert!(through(0.15).unwrap() > 0.95, "{:?}", through(0.15));

@@ -5,14 +5,13 @@ use srrf_cloud::{
     CloudError, KnnIndex, PointCloud, Rigid, estimate_normals, point_spacing, spacing_of, thin_to,
 };
 
+use crate::evenness::evenness;
 use crate::layout::Layout;
 use crate::se3::shift;
-use crate::sight::{SightMap, roughness};
+use crate::sight::{Asked, SightMap};
 
 /// Neighbours of a normal.
 const NORMAL_NEIGHBOURS: usize = 12;
-/// Neighbours of a point on an even surface are off its plane by at most this share of their distance.
-const EVEN: f64 = 0.1;
 /// Matches are within so many spacings of the thinned points.
 const NEAR_SPACINGS: f64 = 1.5;
 /// Matched normals differ by less than acos(0.7), 46 degrees, either way round.
@@ -41,9 +40,9 @@ pub struct ScanSurface {
     pub spacing: f64,
     index: KnnIndex,
     normals: Vec<Vector3<f64>>,
-    /// Whether the surface around each point is even: at an edge, a normal is of neither side. Empty where the place of the scanner is
-    /// not known.
-    even: Vec<bool>,
+    /// How far the surface goes on around each point; 0 where it is not even: at an edge, a normal is of neither side. Empty where the
+    /// place of the scanner is not known.
+    breadth: Vec<f64>,
     /// The same among the thinned points.
     thin_spacing: f64,
     /// How far its scanner saw, where its place is known.
@@ -97,22 +96,29 @@ impl ScanSurface {
         let normals: Vec<Vector3<f64>> =
             estimate_normals(thin.points(), NORMAL_NEIGHBOURS)?.into_iter().map(Vector3::from).collect();
         let index = KnnIndex::new(thin.points())?;
-        let mut even = Vec::new();
+        let mut breadth = Vec::new();
         if sight.is_some() {
             let normals: Vec<[f64; 3]> = normals.iter().map(|n| (*n).into()).collect();
-            even =
-                roughness(&index, &normals).into_iter().map(|(off, around)| off <= EVEN * around).collect();
+            breadth = evenness(&index, &normals).into_iter().map(|e| e.breadth).collect();
         }
         let thin_spacing = spacing_of(&index);
         let layout = None;
         let mut surface =
-            Self { centre, radius, reach, spacing, index, normals, even, thin_spacing, sight, layout };
-        surface.layout = Layout::new(&surface);
+            Self { centre, radius, reach, spacing, index, normals, breadth, thin_spacing, sight, layout };
+        let width = surface.sight_margin(&surface);
+        surface.layout = surface.sight().map(|sight| Layout::new(surface.with_normals(), &sight.eye(), width));
         Ok(surface)
     }
 
+    /// Poses in which the walls of both lie on each other, the best first; none where the place of a scanner is not known.
+    pub fn poses_by_walls(&self, source: &Self) -> Option<Vec<Rigid>> {
+        let ((from, by_source), (to, by_self)) =
+            (source.layout().zip(source.sight())?, self.layout().zip(self.sight())?);
+        Some(from.poses(to, [by_source, by_self], self.sight_margin(source)))
+    }
+
     /// Its walls, where the place of its scanner is known.
-    pub fn layout(&self) -> Option<&Layout> {
+    fn layout(&self) -> Option<&Layout> {
         self.layout.as_ref()
     }
 
@@ -243,8 +249,9 @@ impl ScanSurface {
         self.points().iter().zip(&self.normals)
     }
 
-    fn even_points(&self) -> impl Iterator<Item = (&[f64; 3], &Vector3<f64>)> {
-        self.with_normals().zip(&self.even).filter(|(_, even)| **even).map(|(point, _)| point)
+    fn even_points(&self) -> impl Iterator<Item = Asked<'_>> {
+        let with = |((point, normal), &breadth)| Asked { point, normal, breadth };
+        self.with_normals().zip(&self.breadth).filter(|(_, breadth)| **breadth > 0.0).map(with)
     }
 
     /// The share of the points of one that the scanner of the other saw through, the larger of both. `most` points are asked each way.
@@ -259,6 +266,29 @@ impl ScanSurface {
         match (own, other) {
             (Some(a), Some(b)) => Some(a.max(b)),
             (one, other) => one.or(other),
+        }
+    }
+
+    #[allow(clippy::print_stderr)]
+    pub fn dump(&self, source: &Self, pose: &Rigid, s: usize, t: usize) {
+        let margin = self.sight_margin(source);
+        for (of, by, motion, k, l) in [(source, self, *pose, s, t), (self, source, pose.inverse(), t, s)] {
+            let Some(sight) = &by.sight else { continue };
+            let (mut asked, mut list) = (0, Vec::new());
+            for Asked { point: p, normal: n, breadth } in of.even_points() {
+                let moved = Vector3::from(motion.apply(p));
+                let seen = sight.look(&moved, &(motion.rotation * n), breadth, margin);
+                asked += usize::from(seen != crate::sight::Seen::Unknown);
+                if seen == crate::sight::Seen::Through {
+                    list.push((Vector3::from(*p) + of.centre, *n));
+                }
+            }
+            for (p, n) in list.iter().take(40) {
+                eprintln!("#dump {k} {l} {asked} {} {} {} {} {} {} {}", list.len(), p.x, p.y, p.z, n.x, n.y, n.z);
+            }
+            if list.is_empty() {
+                eprintln!("#dump {k} {l} {asked} 0");
+            }
         }
     }
 

@@ -17,10 +17,14 @@ use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use srrf_cloud::io::write_cloud;
 use srrf_cloud::{PointCloud, Rigid};
-use srrf_corrupt::building::Building;
 use srrf_corrupt::datasets::ShapeSource;
 use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::views::{anywhere, seen_from, turntable};
+
+mod building;
+mod solids;
+
+use building::Building;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -98,7 +102,7 @@ fn turntable_scans(
     Ok(scans)
 }
 
-/// A scan at each station of a building; at those again, a little aside, until there are `most`.
+/// A scan at each station of a building; at those again, each time a little farther aside, until there are `most`.
 fn building_scans(
     row: usize,
     points: usize,
@@ -108,19 +112,21 @@ fn building_scans(
     seed: u64,
 ) -> Outcome<Vec<Taken>> {
     let building = Building::new(row, loose, seed);
-    let stations = building.stations();
+    let stations = &building.stations;
     let rows = ((points as f64 / 2.0).sqrt()).round() as usize;
     (0..most.unwrap_or(stations.len()))
         .map(|i| {
             let station = &stations[i % stations.len()];
-            let aside = 0.25 * (i / stations.len()) as f64;
+            let pass = i / stations.len();
+            let aside = 0.25 * pass as f64;
+            let far = if pass == 0 { 0.0 } else { 0.2 };
             let eye = [
                 station.eye[0] + 0.3 * aside.sin(),
-                station.eye[1] - 0.2 * aside.cos(),
+                station.eye[1] - far * aside.cos(),
                 station.eye[2] + 0.05 * aside,
             ];
-            let scan = building.scan(eye, [2 * rows, rows], noise, seed.wrapping_mul(1000) + i as u64)?;
-            Ok((format!("{}-{}", station.name, i / stations.len()), scan, Some(eye)))
+            let scan = building.solids.scan(eye, [2 * rows, rows], noise, seed.wrapping_mul(1000) + i as u64)?;
+            Ok((format!("{}-{pass}", station.name), scan, Some(eye)))
         })
         .collect()
 }
