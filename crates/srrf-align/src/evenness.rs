@@ -36,7 +36,8 @@ fn at(index: &KnnIndex, point: &[f64; 3], normal: &[f64; 3]) -> Evenness {
     let count = near.len().max(1) as f64;
     let reach = near.iter().map(|n| n.1).fold(0.0, f64::max).sqrt();
     // About the mean: the point itself may be off.
-    let (mut off, mut off_squares, mut flat, mut flat_squares) = (0.0, 0.0, Vector2::zeros(), Matrix2::zeros());
+    let (mut off, mut off_squares, mut flat, mut flat_squares) =
+        (0.0, 0.0, Vector2::zeros(), Matrix2::zeros());
     for (j, _) in &near {
         let d = Vector3::from(index.points()[*j]) - point;
         let (across, along) = (d.dot(&normal), Vector2::new(d.dot(&u), d.dot(&v)));
@@ -58,9 +59,8 @@ mod tests {
 
     /// A grid across z, `long` by `wide` points a tenth apart.
     fn grid(long: i32, wide: i32) -> KnnIndex {
-        let points: Vec<[f64; 3]> = (0..long * wide)
-            .map(|k| [0.1 * f64::from(k % long), 0.1 * f64::from(k / long), 0.0])
-            .collect();
+        let points: Vec<[f64; 3]> =
+            (0..long * wide).map(|k| [0.1 * f64::from(k % long), 0.1 * f64::from(k / long), 0.0]).collect();
         KnnIndex::new(&points).unwrap()
     }
 

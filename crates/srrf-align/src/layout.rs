@@ -305,3 +305,6 @@ fn peaks(votes: &[(f64, f64)], width: f64) -> Vec<f64> {
     }
     kept
 }
+
+#[cfg(test)]
+mod tests;

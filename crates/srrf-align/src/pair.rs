@@ -61,6 +61,20 @@ pub trait RegisterPairs: Sync {
         target: &Self::Target,
         target_from_source: Option<Rigid>,
     ) -> Result<PairAnswer, Self::Error>;
+
+    /// Lays a source on a target from a pose near which it must be, and looks nowhere else. As
+    /// [`register`](Self::register) where a method cannot do so.
+    ///
+    /// # Errors
+    /// For a scan that cannot be a source.
+    fn refine(
+        &self,
+        source: &PointCloud,
+        target: &Self::Target,
+        target_from_source: Rigid,
+    ) -> Result<PairAnswer, Self::Error> {
+        self.register(source, target, Some(target_from_source))
+    }
 }
 
 /// The registration of a pair.

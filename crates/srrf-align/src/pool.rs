@@ -9,10 +9,14 @@ use srrf_cloud::Rigid;
 use crate::graph::GraphEdge;
 use crate::options::{AlignError, AlignProgress, AlignStage, PairReason};
 use crate::pair::{PairAnswer, PairStore, RegisterPairs, Scans};
+use crate::se3::displacement;
 use crate::surface::{Overlay, ScanSurface};
 
 /// Points that share less than this with the other scan are no overlap.
 const LEAST_OVERLAP: f64 = 0.02;
+
+/// Poses that differ by less than so many tolerances are of one place.
+const SAME_PLACE: f64 = 3.0;
 
 /// A pair to try.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,6 +27,8 @@ pub struct Candidate {
     pub reason: PairReason,
     /// A first guess of the first scan's pose in the second's frame: `second_from_first`, input coordinates.
     pub guess: Option<Rigid>,
+    /// Whether the pair is there or nowhere: all other poses were asked.
+    pub only_there: bool,
 }
 
 /// A pair that was tried.
@@ -162,22 +168,26 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Workplace<'_, S, R> {
             .map(|(&at, kept)| {
                 let c = &todo[at];
                 let source = other(c, *target);
+                // The guess is of the first scan in the second's frame.
+                let guess = c.guess.map(|g| if source == c.scans.0 { g } else { g.inverse() });
                 let answer = match (kept, &ready) {
                     (Some(answer), _) => *answer,
                     (None, None) => PairAnswer::NOTHING,
                     (None, Some(ready)) => {
-                        // The guess is of the first scan in the second's frame.
-                        let guess = c.guess.map(|g| if source == c.scans.0 { g } else { g.inverse() });
-                        let answer = self
-                            .method
-                            .register(&*read(source)?, ready, guess)
-                            .map_err(|e| AlignError::Register { number: source, source: e })?;
+                        let scan = read(source)?;
+                        let answer = match guess.filter(|_| c.only_there) {
+                            Some(guess) => self.method.refine(&scan, ready, guess),
+                            None => self.method.register(&scan, ready, guess),
+                        };
+                        let answer =
+                            answer.map_err(|e| AlignError::Register { number: source, source: e })?;
                         self.store.keep(source, *target, &answer);
                         answer
                     }
                 };
                 tick();
-                Ok((at, self.judged(source, *target, c.reason, answer)))
+                let by_walls = guess.filter(|_| c.only_there);
+                Ok((at, self.judged(source, *target, c.reason, answer, by_walls)))
             })
             .collect()
     }
@@ -192,14 +202,27 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Workplace<'_, S, R> {
         })
     }
 
-    fn judged(&self, source: usize, target: usize, reason: PairReason, answer: PairAnswer) -> TriedPair {
+    /// What is made of an answer. Where it is at the pose by which the walls of both lie on each other, the better of the two stands:
+    /// points alone may come to lie on the other side of a wall.
+    fn judged(
+        &self,
+        source: usize,
+        target: usize,
+        reason: PairReason,
+        mut answer: PairAnswer,
+        by_walls: Option<Rigid>,
+    ) -> TriedPair {
         let (moving, fixed) = (&self.surfaces[source], &self.surfaces[target]);
-        let centred = answer.target_from_source.map(|pose| fixed.centred(moving, &pose));
-        let overlay = centred.map(|pose| fixed.overlay(moving, &pose));
-        if std::env::var("SRRF_DUMP").is_ok()
-            && let Some(pose) = &centred
-        {
-            fixed.dump(moving, pose, source, target);
+        let mut centred = answer.target_from_source.map(|pose| fixed.centred(moving, &pose));
+        let mut overlay = centred.map(|pose| fixed.overlay(moving, &pose));
+        if let (Some(walls), Some(pose), Some(found)) = (by_walls, &centred, &overlay) {
+            let there = fixed.centred(moving, &walls);
+            let off = pose.inverse().compose(&there);
+            let near = displacement(&off, moving.radius) <= SAME_PLACE * fixed.tolerance(moving);
+            let other = near.then(|| fixed.overlay(moving, &there)).filter(|other| other.is_better(found));
+            if other.is_some() {
+                (answer.target_from_source, centred, overlay) = (Some(walls), Some(there), other);
+            }
         }
         let stands = centred.is_none_or(|pose| fixed.stands(moving, &pose));
         let lies = stands
@@ -222,7 +245,8 @@ mod tests {
     #[test]
     fn few_targets_serve_all_pairs() {
         let pairs = [(0, 1), (1, 2), (1, 3), (3, 4), (0, 4)];
-        let todo = pairs.map(|scans| Candidate { scans, reason: PairReason::All, guess: None });
+        let todo =
+            pairs.map(|scans| Candidate { scans, reason: PairReason::All, guess: None, only_there: false });
         let stars = stars(&todo);
         assert_eq!(stars, [(1, vec![0, 1, 2]), (4, vec![3, 4])]);
     }

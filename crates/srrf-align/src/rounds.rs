@@ -161,6 +161,7 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
             scans: (a.min(b), a.max(b)),
             reason,
             guess: if a < b { relative } else { relative.map(|g| g.inverse()) },
+            only_there: false,
         }
     }
 
@@ -172,7 +173,13 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
             .pose
             .map(|pose| shift(&surfaces[b].centre).compose(&pose).compose(&shift(&-surfaces[a].centre)));
         let candidate = self.candidate(a, b, reason);
-        Candidate { guess: candidate.guess.or(seen), ..candidate }
+        let only_there = candidate.guess.is_none() && self.walled(a, b);
+        Candidate { guess: candidate.guess.or(seen), only_there, ..candidate }
+    }
+
+    /// Whether the walls of two scans say all poses in which they may lie on each other.
+    fn walled(&self, a: usize, b: usize) -> bool {
+        self.surfaces()[a].has_sight() && self.surfaces()[b].has_sight()
     }
 
     /// Pairs whose first guesses overlap.
@@ -286,7 +293,12 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
         pairs
             .into_iter()
             .filter(|p| chosen.contains(&(p.0, p.1)))
-            .map(|(a, b, _, guess)| Candidate { scans: (a, b), reason: PairReason::Loop, guess: Some(guess) })
+            .map(|(a, b, _, guess)| Candidate {
+                scans: (a, b),
+                reason: PairReason::Loop,
+                guess: Some(guess),
+                only_there: self.walled(a, b),
+            })
             .collect()
     }
 }

@@ -272,6 +272,15 @@ mod tests {
     }
 
     #[test]
+    fn what_is_narrower_than_the_way_between_two_rays_is_not_asked() {
+        let map = SightMap::new(&ball(), Vector3::zeros()).unwrap();
+        // Half a metre before the eye, rays are a good centimetre apart.
+        let (point, normal) = (Vector3::new(0.5, 0.0, 0.01), Vector3::x());
+        assert_eq!(map.look(&point, &normal, 0.02, 0.02), Seen::Through);
+        assert_eq!(map.look(&point, &normal, 0.005, 0.02), Seen::Unknown);
+    }
+
+    #[test]
     fn ways_that_were_not_looked_say_nothing() {
         let upper: Vec<[f64; 3]> = ball().into_iter().filter(|p| p[2] > 0.0).collect();
         let map = SightMap::new(&upper, Vector3::zeros()).unwrap();

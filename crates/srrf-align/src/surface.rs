@@ -14,7 +14,7 @@ use crate::sight::{Asked, SightMap};
 const NORMAL_NEIGHBOURS: usize = 12;
 /// Matches are within so many spacings of the thinned points.
 const NEAR_SPACINGS: f64 = 1.5;
-/// Matched normals differ by less than acos(0.7), 46 degrees, either way round.
+/// Matched normals differ by less than acos(0.7), 46 degrees; either way round where a scanner's place is not known.
 const SAME_NORMAL: f64 = 0.7;
 /// Neighbouring residuals are alike: so many matches count as one.
 pub const ALIKE_MATCHES: f64 = 20.0;
@@ -39,6 +39,7 @@ pub struct ScanSurface {
     /// Median distance between neighbours in the whole scan.
     pub spacing: f64,
     index: KnnIndex,
+    /// Towards the scanner, where its place is known: the two sides of a wall are two surfaces.
     normals: Vec<Vector3<f64>>,
     /// How far the surface goes on around each point; 0 where it is not even: at an edge, a normal is of neither side. Empty where the
     /// place of the scanner is not known.
@@ -78,6 +79,16 @@ pub struct Overlay {
     pub information: Matrix6<f64>,
 }
 
+impl Overlay {
+    /// Whether less is seen through, or as much and more lies on the other scan.
+    pub fn is_better(&self, other: &Self) -> bool {
+        let through = |o: &Self| o.seen_through.unwrap_or(0.0);
+        let overlap = |o: &Self| o.overlap_source + o.overlap_target;
+        let by_sight = through(self).total_cmp(&through(other));
+        by_sight.then(overlap(other).total_cmp(&overlap(self))).is_lt()
+    }
+}
+
 impl ScanSurface {
     /// Thins `cloud` to at most `most` points. `eye` is where its scanner stood, if that is known.
     ///
@@ -93,8 +104,12 @@ impl ScanSurface {
         let spacing = point_spacing(&centred)?;
         let sight = eye.map(|eye| SightMap::new(&centred, Vector3::from(eye) - centre)).transpose()?;
         let thin = thin_to(&PointCloud::new(centred)?, most, radius);
-        let normals: Vec<Vector3<f64>> =
+        let mut normals: Vec<Vector3<f64>> =
             estimate_normals(thin.points(), NORMAL_NEIGHBOURS)?.into_iter().map(Vector3::from).collect();
+        if let Some(sight) = &sight {
+            let away = |(p, n): (&[f64; 3], &Vector3<f64>)| n.dot(&(sight.eye() - Vector3::from(*p))) < 0.0;
+            thin.points().iter().zip(&mut normals).filter(|(p, n)| away((p, n))).for_each(|(_, n)| *n = -*n);
+        }
         let index = KnnIndex::new(thin.points())?;
         let mut breadth = Vec::new();
         if sight.is_some() {
@@ -106,7 +121,8 @@ impl ScanSurface {
         let mut surface =
             Self { centre, radius, reach, spacing, index, normals, breadth, thin_spacing, sight, layout };
         let width = surface.sight_margin(&surface);
-        surface.layout = surface.sight().map(|sight| Layout::new(surface.with_normals(), &sight.eye(), width));
+        surface.layout =
+            surface.sight().map(|sight| Layout::new(surface.with_normals(), &sight.eye(), width));
         Ok(surface)
     }
 
@@ -163,6 +179,7 @@ impl ScanSurface {
     ) -> (Vec<SurfaceMatch>, usize) {
         let step = source.points().len().div_ceil(asked.max(1)).max(1);
         let limit = near * near;
+        let sided = self.has_sight() && source.has_sight();
         let mut count = 0;
         let mut found = Vec::new();
         for (p, normal) in source.points().iter().zip(&source.normals).step_by(step) {
@@ -174,7 +191,8 @@ impl ScanSurface {
             let (nearest, squared) = self.index.nearest(&moved);
             let fixed = self.normals[nearest];
             let turned = self_from_source.rotation * normal;
-            if squared <= limit && turned.dot(&fixed).abs() > SAME_NORMAL {
+            let same = turned.dot(&fixed);
+            if squared <= limit && (if sided { same } else { same.abs() }) > SAME_NORMAL {
                 let moved = Vector3::from(moved);
                 let off = fixed.dot(&(moved - Vector3::from(self.points()[nearest])));
                 found.push(SurfaceMatch { point: Vector3::from(*p), moved, normal: fixed, off });
@@ -269,29 +287,6 @@ impl ScanSurface {
         }
     }
 
-    #[allow(clippy::print_stderr)]
-    pub fn dump(&self, source: &Self, pose: &Rigid, s: usize, t: usize) {
-        let margin = self.sight_margin(source);
-        for (of, by, motion, k, l) in [(source, self, *pose, s, t), (self, source, pose.inverse(), t, s)] {
-            let Some(sight) = &by.sight else { continue };
-            let (mut asked, mut list) = (0, Vec::new());
-            for Asked { point: p, normal: n, breadth } in of.even_points() {
-                let moved = Vector3::from(motion.apply(p));
-                let seen = sight.look(&moved, &(motion.rotation * n), breadth, margin);
-                asked += usize::from(seen != crate::sight::Seen::Unknown);
-                if seen == crate::sight::Seen::Through {
-                    list.push((Vector3::from(*p) + of.centre, *n));
-                }
-            }
-            for (p, n) in list.iter().take(40) {
-                eprintln!("#dump {k} {l} {asked} {} {} {} {} {} {} {}", list.len(), p.x, p.y, p.z, n.x, n.y, n.z);
-            }
-            if list.is_empty() {
-                eprintln!("#dump {k} {l} {asked} 0");
-            }
-        }
-    }
-
     /// How far its scanner saw, where its place is known.
     pub fn sight(&self) -> Option<&SightMap> {
         self.sight.as_ref()
@@ -346,6 +341,32 @@ mod tests {
         assert!(spread[(3, 3)].sqrt() < 2.0 * sigma && spread[(3, 3)].sqrt() >= sigma, "{spread}");
         let away = exp(&Vector6::new(0.0, 0.0, 0.0, 5.0, 0.0, 0.0));
         assert_eq!(surface.overlap(&surface, &away, 200), 0.0);
+    }
+
+    #[test]
+    fn the_two_sides_of_a_wall_are_two_surfaces_where_the_scanners_are_known() {
+        let seen_from = |height: Option<f64>| {
+            let eye = height.map(|h| [100.5, 100.5, 100.0 + h]);
+            ScanSurface::new(&corner(40, 1), 2000, eye).unwrap()
+        };
+        let overlap =
+            |a: Option<f64>, b: Option<f64>| seen_from(a).overlap(&seen_from(b), &Rigid::identity(), 400);
+        assert_eq!(overlap(Some(1.0), Some(-1.0)), 0.0);
+        assert!(overlap(Some(1.0), Some(0.7)) > 0.95);
+        assert!(overlap(Some(1.0), None) > 0.95);
+    }
+
+    #[test]
+    fn the_better_of_two_poses_is_seen_through_less_then_overlaps_more() {
+        let surface = ScanSurface::new(&corner(12, 3), 500, None).unwrap();
+        let overlay = surface.overlay(&surface, &Rigid::identity());
+        let with = |through: f64, overlap: f64| Overlay {
+            overlap_source: overlap,
+            seen_through: Some(through),
+            ..overlay.clone()
+        };
+        assert!(with(0.0, 0.5).is_better(&with(0.01, 0.9)));
+        assert!(with(0.0, 0.6).is_better(&with(0.0, 0.5)) && !with(0.0, 0.5).is_better(&with(0.0, 0.5)));
     }
 
     #[test]

@@ -90,8 +90,29 @@ impl RegisterPairs for Stoppable<'_> {
         target: &Target,
         target_from_source: Option<Rigid>,
     ) -> Result<PairAnswer, srrf::Error> {
+        self.answered(self.inner, source, target, target_from_source)
+    }
+
+    fn refine(
+        &self,
+        source: &PointCloud,
+        target: &Target,
+        target_from_source: Rigid,
+    ) -> Result<PairAnswer, srrf::Error> {
+        self.answered(&self.inner.guided()?, source, target, Some(target_from_source))
+    }
+}
+
+impl Stoppable<'_> {
+    fn answered(
+        &self,
+        registrar: &srrf::Registrar,
+        source: &PointCloud,
+        target: &Target,
+        target_from_source: Option<Rigid>,
+    ) -> Result<PairAnswer, srrf::Error> {
         let request = Request { initial: target_from_source, ..Request::new(source, target) };
-        match self.inner.register(&request.until(self.stop)) {
+        match registrar.register(&request.until(self.stop)) {
             Ok(found) => Ok(PairAnswer {
                 target_from_source: Some(found.target_from_source),
                 probability: found.probability.get(),

@@ -6,7 +6,7 @@ use srrf_align::{AlignError, AlignOptions, Map, NoStore, PairAnswer, RegisterPai
 use srrf_cloud::{PointCloud, Rigid};
 
 use crate::error::Error;
-use crate::options::Options;
+use crate::options::{Method, Options};
 use crate::registrar::Registrar;
 use crate::request::Request;
 use crate::target::Target;
@@ -35,6 +35,25 @@ impl RegisterPairs for Registrar {
             Err(Error::NoPose(_)) => Ok(PairAnswer::NOTHING),
             Err(other) => Err(other),
         }
+    }
+
+    fn refine(
+        &self,
+        source: &PointCloud,
+        target: &Target,
+        target_from_source: Rigid,
+    ) -> Result<PairAnswer, Error> {
+        RegisterPairs::register(&self.guided()?, source, target, Some(target_from_source))
+    }
+}
+
+impl Registrar {
+    /// One with the same options that looks only at first guesses, for targets that this one made ready.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn guided(&self) -> Result<Self, Error> {
+        Self::new(Options { method: Method::Given, ..self.options().clone() })
     }
 }
 

@@ -80,7 +80,8 @@ impl Building {
                 building.wall(0, i as f64 * ROOM_WIDTH, low, low + ROOM_DEPTH);
             }
             for i in 0..a_row {
-                let left = building.room(row * a_row + i, i as f64 * ROOM_WIDTH, far, door_at, loose, &mut rng);
+                let left =
+                    building.room(row * a_row + i, i as f64 * ROOM_WIDTH, far, door_at, loose, &mut rng);
                 doors.push((door_at, left));
             }
         }
@@ -99,7 +100,15 @@ impl Building {
     }
 
     /// A room between `x` and the next, its far wall at `far` and its door in the wall at `door_at`; where the door begins.
-    fn room(&mut self, number: usize, x: f64, far: f64, door_at: f64, loose: usize, rng: &mut ChaCha8Rng) -> f64 {
+    fn room(
+        &mut self,
+        number: usize,
+        x: f64,
+        far: f64,
+        door_at: f64,
+        loose: usize,
+        rng: &mut ChaCha8Rng,
+    ) -> f64 {
         let kind = rng.random_range(0..3usize);
         let left = x + [0.5, 1.8, 3.0][kind];
         self.wall(1, door_at, x, left);
@@ -145,7 +154,13 @@ impl Building {
         left
     }
 
-    fn corridors(&mut self, [west, east]: [f64; 2], rows: [f64; 2], doors: &[(f64, f64)], rng: &mut ChaCha8Rng) {
+    fn corridors(
+        &mut self,
+        [west, east]: [f64; 2],
+        rows: [f64; 2],
+        doors: &[(f64, f64)],
+        rng: &mut ChaCha8Rng,
+    ) {
         let [first, second] = rows;
         let end = second + CORRIDOR;
         // Around the ends, where no room is.
@@ -158,13 +173,20 @@ impl Building {
         for base in rows {
             let inner = if base == first { base + CORRIDOR } else { base };
             let outer = if base == first { base } else { base + CORRIDOR };
-            let side = |at: f64, from: f64, to: f64| Side { axis: 1, at, into: (base + 1.2 - at).signum(), from, to };
+            let side = |at: f64, from: f64, to: f64| Side {
+                axis: 1,
+                at,
+                into: (base + 1.2 - at).signum(),
+                from,
+                to,
+            };
             self.furnish(&side(outer, west, east + CORRIDOR), doors, rng);
             self.furnish(&side(inner, 0.0, east), doors, rng);
         }
         for (low, inside) in [(west, 0.0), (east, east)] {
             let outside = if low == west { low } else { low + CORRIDOR };
-            let side = |at: f64, from: f64, to: f64| Side { axis: 0, at, into: (low + 1.2 - at).signum(), from, to };
+            let side =
+                |at: f64, from: f64, to: f64| Side { axis: 0, at, into: (low + 1.2 - at).signum(), from, to };
             self.furnish(&side(outside, first, end), &[], rng);
             self.furnish(&side(inside, first + CORRIDOR, second), &[], rng);
         }
@@ -198,12 +220,28 @@ impl Building {
             let kind = rng.random_range(0..6usize);
             // How wide, how deep, from where to where in height.
             let [wide, deep, low, high] = match kind {
-                0 => [rng.random_range(0.5..1.1), rng.random_range(0.3..0.45), 0.0, rng.random_range(0.9..2.0)],
-                1 => [rng.random_range(0.6..1.2), rng.random_range(0.1..0.16), 0.12, rng.random_range(0.6..0.9)],
-                2 => [rng.random_range(0.3..0.6), rng.random_range(0.3..0.5), 0.0, rng.random_range(0.3..0.7)],
-                3 => [0.06, rng.random_range(0.3..0.5), rng.random_range(2.1..2.3), rng.random_range(2.4..2.7)],
+                0 => {
+                    [rng.random_range(0.5..1.1), rng.random_range(0.3..0.45), 0.0, rng.random_range(0.9..2.0)]
+                }
+                1 => [
+                    rng.random_range(0.6..1.2),
+                    rng.random_range(0.1..0.16),
+                    0.12,
+                    rng.random_range(0.6..0.9),
+                ],
+                2 => {
+                    [rng.random_range(0.3..0.6), rng.random_range(0.3..0.5), 0.0, rng.random_range(0.3..0.7)]
+                }
+                3 => {
+                    [0.06, rng.random_range(0.3..0.5), rng.random_range(2.1..2.3), rng.random_range(2.4..2.7)]
+                }
                 4 => [rng.random_range(0.1..0.2), rng.random_range(0.1..0.2), 0.0, HEIGHT],
-                _ => [rng.random_range(0.8..2.0), rng.random_range(0.25..0.6), rng.random_range(2.6..2.8), HEIGHT],
+                _ => [
+                    rng.random_range(0.8..2.0),
+                    rng.random_range(0.25..0.6),
+                    rng.random_range(2.6..2.8),
+                    HEIGHT,
+                ],
             };
             let (from, to) = (begin + rng.random_range(0.0..0.4), side.to.min(begin + 0.4 + wide));
             let to = to.min(from + wide);

@@ -125,7 +125,8 @@ fn building_scans(
                 station.eye[1] - far * aside.cos(),
                 station.eye[2] + 0.05 * aside,
             ];
-            let scan = building.solids.scan(eye, [2 * rows, rows], noise, seed.wrapping_mul(1000) + i as u64)?;
+            let scan =
+                building.solids.scan(eye, [2 * rows, rows], noise, seed.wrapping_mul(1000) + i as u64)?;
             Ok((format!("{}-{pass}", station.name), scan, Some(eye)))
         })
         .collect()

@@ -56,7 +56,13 @@ impl Solids {
     ///
     /// # Errors
     /// [`CloudError::Empty`] where no ray meets anything.
-    pub fn scan(&self, eye: [f64; 3], rays: [usize; 2], noise: f64, seed: u64) -> Result<PointCloud, CloudError> {
+    pub fn scan(
+        &self,
+        eye: [f64; 3],
+        rays: [usize; 2],
+        noise: f64,
+        seed: u64,
+    ) -> Result<PointCloud, CloudError> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let [columns, rows] = rays;
         let first: f64 = rng.random_range(0.0..1.0);
