@@ -94,7 +94,7 @@ mod tests {
 
     fn a_loop(edges: &[usize], closes: bool) -> EdgeLoop {
         let chi_squared = if closes { 1.0 } else { 1e4 };
-        EdgeLoop { edges: edges.to_vec(), error: Rigid::identity(), chi_squared }
+        EdgeLoop { edges: edges.to_vec(), error: Rigid::identity(), chi_squared, implied: false }
     }
 
     #[test]

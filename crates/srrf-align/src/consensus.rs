@@ -110,9 +110,7 @@ pub fn agree(nodes: usize, edges: &[GraphEdge], known: EdgeEvidence<'_>) -> Cons
         let unasked: Vec<bool> = confirmed(edges.len(), &first, short).iter().map(|c| !c).collect();
         all = short.to_vec();
         let mut long = ways_round(nodes, edges, &first, &unasked);
-        long.iter_mut()
-            .filter(|l| l.closes() == Some(true) && (known.implied)(l))
-            .for_each(EdgeLoop::silence);
+        long.iter_mut().filter(|l| l.closes() == Some(true)).for_each(|l| l.implied = (known.implied)(l));
         all.extend(long);
         posterior = beliefs(&now, &all);
         let next = shift(prior, &posterior);
@@ -146,7 +144,8 @@ pub fn agree(nodes: usize, edges: &[GraphEdge], known: EdgeEvidence<'_>) -> Cons
     let holds: Vec<bool> = verdicts.iter().map(|v| *v == EdgeVerdict::Holds).collect();
     settle(nodes, &mut poses, edges, &holds, &groups);
     let rivals = rivals(&all, &verdicts, &seen);
-    let measured = |l: &EdgeLoop| l.chi_squared.is_finite() && l.edges.iter().all(|e| holds[*e]);
+    let measured =
+        |l: &EdgeLoop| l.chi_squared.is_finite() && !l.implied && l.edges.iter().all(|e| holds[*e]);
     let holding = all.into_iter().filter(measured).collect();
     Consensus { poses, components: groups, verdicts, posterior, loops: holding, rivals, look_alike }
 }
@@ -163,12 +162,25 @@ fn rivals(loops: &[EdgeLoop], verdicts: &[EdgeVerdict], prior: &[f64]) -> Vec<Ed
         .collect()
 }
 
-/// For each edge, whether a loop of likely edges closes with it.
+/// For each edge, whether a loop closes with it whose other edges are likely.
 fn confirmed(count: usize, likely: &[f64], loops: &[EdgeLoop]) -> Vec<bool> {
+    closing(count, loops.iter().filter(|l| l.closes() == Some(true)), |e| likely[e] >= HALF)
+}
+
+/// For each edge, whether a loop closes with it by itself, and its other edges are sure: several pairs say the same, yet by one look.
+fn repeated(count: usize, likely: &[f64], loops: &[EdgeLoop]) -> Vec<bool> {
+    closing(count, loops.iter().filter(|l| l.implied && l.chi_squared <= CLOSES), |e| likely[e] >= SURE)
+}
+
+fn closing<'a>(
+    count: usize,
+    loops: impl Iterator<Item = &'a EdgeLoop>,
+    speaks: impl Fn(usize) -> bool,
+) -> Vec<bool> {
     let mut of = vec![false; count];
-    for l in loops.iter().filter(|l| l.closes() == Some(true)) {
+    for l in loops {
         for &edge in &l.edges {
-            of[edge] |= l.edges.iter().all(|e| *e == edge || likely[*e] >= HALF);
+            of[edge] |= l.edges.iter().all(|e| *e == edge || speaks(*e));
         }
     }
     of
@@ -188,7 +200,8 @@ fn only_there(edges: &[GraphEdge], posterior: &[f64], known: EdgeEvidence<'_>) -
     edges.iter().map(|edge| !fits(&edge.source) && !fits(&edge.target)).collect()
 }
 
-/// Which edges may join scans. Where places look alike, a pair that no loop confirms joins only scans that fit nowhere else.
+/// Which edges may join scans. Where places look alike, a pair that no loop confirms joins only scans that fit nowhere else. One whose
+/// registration abstains does so only if scanners saw nothing against it as well, and other pairs say the same.
 fn joining(
     edges: &[GraphEdge],
     posterior: &[f64],
@@ -197,12 +210,15 @@ fn joining(
     look_alike: bool,
 ) -> Vec<bool> {
     let alone = only_there(edges, posterior, known);
+    let repeated = repeated(posterior.len(), posterior, loops);
     confirmed(posterior.len(), posterior, loops)
         .into_iter()
         .enumerate()
         .map(|(e, confirmed)| match () {
             () if confirmed => posterior[e] >= HALF,
-            () if known.abstains[e] => false,
+            () if known.abstains[e] => {
+                posterior[e] >= SURE && known.sight[e] > 0.0 && repeated[e] && alone[e]
+            }
             () if known.vouched[e] => posterior[e] >= HALF,
             () => posterior[e] >= SURE && (!look_alike || alone[e]),
         })

@@ -27,21 +27,21 @@ pub struct EdgeLoop {
     pub error: Rigid,
     /// Squared Mahalanobis distance of that from the identity.
     pub chi_squared: f64,
+    /// Whether it closes by itself, and so says nothing.
+    pub implied: bool,
 }
 
 impl EdgeLoop {
     /// Whether it closes; `None` where that is not clear.
     pub fn closes(&self) -> Option<bool> {
+        if self.implied {
+            return None;
+        }
         match self.chi_squared {
             c if c <= CLOSES => Some(true),
             c if c > APART * CLOSES => Some(false),
             _ => None,
         }
-    }
-
-    /// Makes it say nothing.
-    pub fn silence(&mut self) {
-        self.chi_squared = f64::NAN;
     }
 }
 
@@ -73,7 +73,7 @@ pub fn go_around(edges: &[GraphEdge], numbers: &[usize], start: usize) -> EdgeLo
         Some(factors) => twist.dot(&factors.solve(&twist)),
         None => f64::INFINITY,
     };
-    EdgeLoop { edges: numbers.to_vec(), error: motion, chi_squared }
+    EdgeLoop { edges: numbers.to_vec(), error: motion, chi_squared, implied: false }
 }
 
 /// The triangles of the graph, and pairs that were measured twice. Edges whose `likely` is 0 are none.

@@ -46,11 +46,10 @@ pub fn consensus_of(surfaces: &[ScanSurface], pool: &PairPool) -> Consensus {
         })
         .collect();
     let mut loops = triangles(surfaces.len(), &edges, &prior);
-    loops.par_iter_mut().filter(|l| l.closes() == Some(true)).for_each(|l| {
-        if is_implied(surfaces, &edges, l) {
-            l.silence();
-        }
-    });
+    loops
+        .par_iter_mut()
+        .filter(|l| l.closes() == Some(true))
+        .for_each(|l| l.implied = is_implied(surfaces, &edges, l));
     loops.extend(conflicts(surfaces, &edges, &prior, sight));
     let mut round = 0;
     loop {
@@ -116,6 +115,7 @@ fn conflicts(surfaces: &[ScanSurface], edges: &[GraphEdge], prior: &[f64], sight
                 edges: vec![x, y],
                 error: Rigid::identity(),
                 chi_squared: f64::INFINITY,
+                implied: false,
             })
         })
         .collect()
@@ -149,6 +149,7 @@ fn seen_through(
                 edges: way,
                 error: Rigid::identity(),
                 chi_squared: f64::INFINITY,
+                implied: false,
             })
         })
         .collect()

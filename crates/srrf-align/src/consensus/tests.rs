@@ -143,7 +143,7 @@ fn what_scanners_saw_breaks_a_map() {
     assert_eq!(agreed(6, &edges, &prior, &[false; 7]).components.len(), 1);
     // Scans of the one side see through those of the other, each way over the bridge.
     let blocked: Vec<EdgeLoop> = [vec![6], vec![0, 2, 6], vec![6, 3]]
-        .map(|edges| EdgeLoop { edges, error: Rigid::identity(), chi_squared: f64::INFINITY })
+        .map(|edges| EdgeLoop { edges, error: Rigid::identity(), chi_squared: f64::INFINITY, implied: false })
         .to_vec();
     let mut loops = triangles(6, &edges, &prior);
     loops.extend(blocked);
@@ -158,6 +158,34 @@ fn what_scanners_saw_breaks_a_map() {
     };
     let found = agree(6, &edges, known);
     assert_eq!(found.components, [vec![0, 1, 2], vec![3, 4, 5]], "{found:?}");
+}
+
+#[test]
+fn edges_that_abstain_join_where_all_was_seen_and_they_say_the_same() {
+    let truth = ring(5);
+    let mut edges: Vec<GraphEdge> =
+        [(0, 1), (1, 2), (0, 2), (3, 1), (3, 2), (3, 4)].map(|(a, b)| exact(&truth, a, b)).to_vec();
+    // The last: a place elsewhere that node 3 fits.
+    edges[5].target_from_source.translation.x += 7.0;
+    let prior = [0.95, 0.95, 0.95, 0.3, 0.3, 0.3];
+    let with = |sight: [f64; 6]| {
+        let mut loops = triangles(5, &edges, &prior);
+        loops.iter_mut().for_each(|l| l.implied = l.edges.contains(&3));
+        let known = EdgeEvidence {
+            prior: &prior,
+            sight: &sight,
+            twins: &[false; 6],
+            abstains: &[false, false, false, true, true, true],
+            vouched: &[false; 6],
+            loops: &loops,
+            implied: &|l| l.edges.contains(&3),
+        };
+        agree(5, &edges, known).components[0].clone()
+    };
+    assert_eq!(with([0.0, 0.0, 0.0, 5.0, 5.0, -9.0]), [0, 1, 2, 3]);
+    assert_eq!(with([0.0; 6]), [0, 1, 2], "no scanner saw it");
+    assert_eq!(with([0.0, 0.0, 0.0, 5.0, -9.0, -9.0]), [0, 1, 2], "one pair alone");
+    assert_eq!(with([0.0, 0.0, 0.0, 5.0, 5.0, 0.5]), [0, 1, 2], "it fits elsewhere");
 }
 
 #[test]
