@@ -1,4 +1,4 @@
-//! [`Layout`]: the walls of a scan by direction, and the poses in which the walls of two scans lie on each other.
+//! [`WallLayout`]: the walls of a scan by direction, and the poses in which the walls of two scans lie on each other.
 //!
 //! Buildings repeat: descriptors of points match a room with each of its kind, and a corridor with all. Their walls leave few poses
 //! of two scans, so that all of them can be asked, each by what the scanners saw. Directions of walls give rotations; shifts along
@@ -51,13 +51,13 @@ struct Face {
 
 /// The walls of a scan.
 #[derive(Debug, Clone)]
-pub struct Layout {
+pub struct WallLayout {
     faces: Vec<Face>,
     up: Option<Vector3<f64>>,
     probes: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
-impl Layout {
+impl WallLayout {
     /// Of the points of a scan with their normals, and the place of its scanner. Walls are so thick as `width`.
     pub fn new<'a>(
         points: impl Iterator<Item = (&'a [f64; 3], &'a Vector3<f64>)>,
@@ -233,7 +233,7 @@ impl Layout {
                 return None;
             }
         }
-        (there > 0).then(|| there as f64 - THROUGH * through as f64)
+        (there > 0).then_some(there as f64 - THROUGH * through as f64)
     }
 }
 

@@ -49,7 +49,7 @@ struct Patch {
 
 /// A place on a surface that a scanner is asked about.
 #[derive(Debug, Clone, Copy)]
-pub struct Asked<'a> {
+pub struct SurfaceSpot<'a> {
     pub point: &'a [f64; 3],
     pub normal: &'a Vector3<f64>,
     /// How far the surface goes on to the nearest side.
@@ -202,12 +202,12 @@ impl SightMap {
     /// through, that is, that are clearly nearer than all that it saw there. None where few points are in such directions.
     pub fn seen_through<'a>(
         &self,
-        points: impl Iterator<Item = Asked<'a>>,
+        points: impl Iterator<Item = SurfaceSpot<'a>>,
         frame_from_points: &Rigid,
         margin: f64,
     ) -> Option<f64> {
         let (mut asked, mut through) = (0usize, 0usize);
-        for Asked { point, normal, breadth } in points {
+        for SurfaceSpot { point, normal, breadth } in points {
             let moved = Vector3::from(frame_from_points.apply(point));
             let seen = self.look(&moved, &(frame_from_points.rotation * normal), breadth, margin);
             asked += usize::from(seen != Seen::Unknown);
@@ -235,7 +235,8 @@ mod tests {
 
     fn share(map: &SightMap, points: &[[f64; 3]]) -> Option<f64> {
         let normals: Vec<Vector3<f64>> = points.iter().map(|p| Vector3::from(*p).normalize()).collect();
-        let asked = points.iter().zip(&normals).map(|(point, normal)| Asked { point, normal, breadth: 0.1 });
+        let asked =
+            points.iter().zip(&normals).map(|(point, normal)| SurfaceSpot { point, normal, breadth: 0.1 });
         map.seen_through(asked, &Rigid::identity(), 0.02)
     }
 
@@ -264,7 +265,7 @@ mod tests {
         let through = |depth: f64| {
             let points: Vec<[f64; 3]> = wall(depth).filter(|p| p[0] > 2.5 && p[0] < 3.5).collect();
             let normal = Vector3::y();
-            let asked = points.iter().map(|point| Asked { point, normal: &normal, breadth: 0.5 });
+            let asked = points.iter().map(|point| SurfaceSpot { point, normal: &normal, breadth: 0.5 });
             map.seen_through(asked, &Rigid::identity(), 0.03)
         };
         assert_eq!(through(0.01), Some(0.0));

@@ -6,9 +6,9 @@ use srrf_cloud::{
 };
 
 use crate::evenness::evenness;
-use crate::layout::Layout;
+use crate::layout::WallLayout;
 use crate::se3::shift;
-use crate::sight::{Asked, SightMap};
+use crate::sight::{SightMap, SurfaceSpot};
 
 /// Neighbours of a normal.
 const NORMAL_NEIGHBOURS: usize = 12;
@@ -48,7 +48,7 @@ pub struct ScanSurface {
     thin_spacing: f64,
     /// How far its scanner saw, where its place is known.
     sight: Option<SightMap>,
-    layout: Option<Layout>,
+    layout: Option<WallLayout>,
 }
 
 /// A point of one scan that lies on the surface of another.
@@ -122,7 +122,7 @@ impl ScanSurface {
             Self { centre, radius, reach, spacing, index, normals, breadth, thin_spacing, sight, layout };
         let width = surface.sight_margin(&surface);
         surface.layout =
-            surface.sight().map(|sight| Layout::new(surface.with_normals(), &sight.eye(), width));
+            surface.sight().map(|sight| WallLayout::new(surface.with_normals(), &sight.eye(), width));
         Ok(surface)
     }
 
@@ -134,7 +134,7 @@ impl ScanSurface {
     }
 
     /// Its walls, where the place of its scanner is known.
-    fn layout(&self) -> Option<&Layout> {
+    fn layout(&self) -> Option<&WallLayout> {
         self.layout.as_ref()
     }
 
@@ -267,8 +267,8 @@ impl ScanSurface {
         self.points().iter().zip(&self.normals)
     }
 
-    fn even_points(&self) -> impl Iterator<Item = Asked<'_>> {
-        let with = |((point, normal), &breadth)| Asked { point, normal, breadth };
+    fn even_points(&self) -> impl Iterator<Item = SurfaceSpot<'_>> {
+        let with = |((point, normal), &breadth)| SurfaceSpot { point, normal, breadth };
         self.with_normals().zip(&self.breadth).filter(|(_, breadth)| **breadth > 0.0).map(with)
     }
 

@@ -33,7 +33,7 @@ pub fn upward(
     holes.sort_by(|a, b| b.0.total_cmp(&a.0));
     let (angle, up) = *holes.first()?;
     let second = holes.get(1).map_or(0.0, |h| h.0);
-    (angle >= CONE_DEG[0] && angle <= CONE_DEG[1] && second <= SECOND * angle).then_some(up)
+    ((CONE_DEG[0]..=CONE_DEG[1]).contains(&angle) && second <= SECOND * angle).then_some(up)
 }
 
 /// Whether a rotation keeps what is up in both up; true where that is not known.

@@ -40,9 +40,9 @@ fn scanned(eye: [f64; 3], moved: &Rigid) -> (Vec<[f64; 3]>, Vec<Vector3<f64>>, V
     (points, normals, Vector3::from(moved.apply(&eye.into())))
 }
 
-fn laid_out(eye: [f64; 3], moved: &Rigid) -> (Layout, SightMap) {
+fn laid_out(eye: [f64; 3], moved: &Rigid) -> (WallLayout, SightMap) {
     let (points, normals, eye) = scanned(eye, moved);
-    let layout = Layout::new(points.iter().zip(&normals), &eye, 0.06);
+    let layout = WallLayout::new(points.iter().zip(&normals), &eye, 0.06);
     (layout, SightMap::new(&points, eye).unwrap())
 }
 
