@@ -36,6 +36,8 @@ const FIRST_PROBES: usize = 12;
 const MOST_THROUGH: usize = 5;
 /// What seeing through a point costs, where seeing it counts one.
 const THROUGH: f64 = 3.0;
+/// A scan is of walls where so many of its points are on them, and they stand three ways.
+const WALLED: f64 = 0.6;
 /// Poses that are refined.
 pub const MOST_POSES: usize = 8;
 
@@ -87,6 +89,17 @@ impl WallLayout {
         }
         let ways: Vec<Vector3<f64>> = faces.iter().take(TELLING).map(|f: &Face| f.toward).collect();
         Self { faces, up: upward(&whole, eye, &ways), probes }
+    }
+
+    /// Whether most of the scan is walls, floors and ceilings, and they hold it each way.
+    pub fn is_walled(&self) -> bool {
+        let mut axes: Vec<Vector3<f64>> = Vec::new();
+        for face in self.faces.iter().filter(|f| !f.levels.is_empty()) {
+            if axes.iter().all(|a| a.dot(&face.toward).abs() < APART) {
+                axes.push(face.toward);
+            }
+        }
+        axes.len() >= 3 && self.faces.iter().map(|f| f.share).sum::<f64>() >= WALLED
     }
 
     /// Whether a pose keeps up what is up, as far as both scans tell.

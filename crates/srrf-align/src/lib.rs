@@ -22,6 +22,7 @@ mod loops;
 mod map;
 mod near;
 mod options;
+mod overlay;
 mod pair;
 mod placed;
 mod pool;

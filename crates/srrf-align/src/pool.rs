@@ -8,9 +8,10 @@ use srrf_cloud::Rigid;
 
 use crate::graph::GraphEdge;
 use crate::options::{AlignError, AlignProgress, AlignStage, PairReason};
+use crate::overlay::Overlay;
 use crate::pair::{PairAnswer, PairStore, RegisterPairs, Scans};
 use crate::se3::displacement;
-use crate::surface::{Overlay, ScanSurface};
+use crate::surface::ScanSurface;
 
 /// Points that share less than this with the other scan are no overlap.
 const LEAST_OVERLAP: f64 = 0.02;

@@ -81,8 +81,19 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
         let some_unknown = (0..n).any(|i| self.options.initial.get(i).copied().flatten().is_none());
         let every = self.options.all_pairs == usize::MAX || (some_unknown && !self.options.sequence);
         if n <= self.options.all_pairs && every {
+            let by_walls: BTreeMap<(usize, usize), LikelyPair> =
+                if self.surfaces().iter().filter(|s| s.is_walled()).count() < 2 {
+                    BTreeMap::new()
+                } else {
+                    self.alike()?.into_iter().map(|pair| (pair.scans, pair)).collect()
+                };
             let pairs = (0..n).flat_map(|b| (0..b).map(move |a| (a, b)));
-            let all = pairs.map(|(a, b)| self.candidate(a, b, PairReason::All)).collect();
+            let all = pairs
+                .map(|(a, b)| match by_walls.get(&(a, b)).filter(|_| self.walled(a, b)) {
+                    Some(pair) => self.likely(pair, PairReason::All),
+                    None => self.candidate(a, b, PairReason::All),
+                })
+                .collect();
             self.try_pairs(PairReason::All, all)?;
             return Ok(self.consensus());
         }
@@ -97,10 +108,7 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
         let begun = !self.pool.tried.is_empty();
         let mut found = self.consensus();
         if !begun || found.components.len() > 1 {
-            (self.place.progress)(AlignProgress { stage: AlignStage::Candidates, done: 0, total: n });
-            let digests =
-                digests(self.surfaces()).map_err(|(number, source)| AlignError::Cloud { number, source })?;
-            let alike = likely_pairs(self.surfaces(), &digests);
+            let alike = self.alike()?;
             self.compared = alike.len();
             if !begun {
                 let first = self.first_round(&alike);
@@ -133,6 +141,15 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
             found = self.consensus();
         }
         Ok(found)
+    }
+
+    /// All pairs that look alike, the most alike first.
+    fn alike(&self) -> Result<Vec<LikelyPair>, Failed<S, R>> {
+        let total = self.surfaces().len();
+        (self.place.progress)(AlignProgress { stage: AlignStage::Candidates, done: 0, total });
+        let digests =
+            digests(self.surfaces()).map_err(|(number, source)| AlignError::Cloud { number, source })?;
+        Ok(likely_pairs(self.surfaces(), &digests))
     }
 
     fn try_pairs(&mut self, reason: PairReason, mut pairs: Vec<Candidate>) -> Result<(), Failed<S, R>> {
@@ -179,7 +196,7 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Rounds<'_, '_, S, R> {
 
     /// Whether the walls of two scans say all poses in which they may lie on each other.
     fn walled(&self, a: usize, b: usize) -> bool {
-        self.surfaces()[a].has_sight() && self.surfaces()[b].has_sight()
+        self.surfaces()[a].is_walled() && self.surfaces()[b].is_walled()
     }
 
     /// Pairs whose first guesses overlap.

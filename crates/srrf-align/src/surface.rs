@@ -7,6 +7,7 @@ use srrf_cloud::{
 
 use crate::evenness::evenness;
 use crate::layout::WallLayout;
+use crate::overlay::Overlay;
 use crate::se3::shift;
 use crate::sight::{SightMap, SurfaceSpot};
 
@@ -64,31 +65,6 @@ pub struct SurfaceMatch {
     pub off: f64,
 }
 
-/// How two scans lie on each other.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Overlay {
-    /// Share of the source's points that lie on the target.
-    pub overlap_source: f64,
-    /// Share of the target's points that lie on the source.
-    pub overlap_target: f64,
-    /// The share of one scan's points that the other's scanner saw through, the larger of both; none where no place of a scanner is known.
-    pub seen_through: Option<f64>,
-    /// Root mean square distance of those, along the normals.
-    pub rms: f64,
-    /// Inverse covariance of a motion after the pose, in the target's frame about its centre; rotation first.
-    pub information: Matrix6<f64>,
-}
-
-impl Overlay {
-    /// Whether less is seen through, or as much and more lies on the other scan.
-    pub fn is_better(&self, other: &Self) -> bool {
-        let through = |o: &Self| o.seen_through.unwrap_or(0.0);
-        let overlap = |o: &Self| o.overlap_source + o.overlap_target;
-        let by_sight = through(self).total_cmp(&through(other));
-        by_sight.then(overlap(other).total_cmp(&overlap(self))).is_lt()
-    }
-}
-
 impl ScanSurface {
     /// Thins `cloud` to at most `most` points. `eye` is where its scanner stood, if that is known.
     ///
@@ -126,8 +102,16 @@ impl ScanSurface {
         Ok(surface)
     }
 
-    /// Poses in which the walls of both lie on each other, the best first; none where the place of a scanner is not known.
+    /// Whether it is known where its scanner stood, and most of what that saw is walls.
+    pub fn is_walled(&self) -> bool {
+        self.layout.as_ref().is_some_and(WallLayout::is_walled)
+    }
+
+    /// Poses in which the walls of both lie on each other, the best first; none for scans that are not of walls.
     pub fn poses_by_walls(&self, source: &Self) -> Option<Vec<Rigid>> {
+        if !self.is_walled() || !source.is_walled() {
+            return None;
+        }
         let ((from, by_source), (to, by_self)) =
             (source.layout().zip(source.sight())?, self.layout().zip(self.sight())?);
         Some(from.poses(to, [by_source, by_self], self.sight_margin(source)))
@@ -354,19 +338,6 @@ mod tests {
         assert_eq!(overlap(Some(1.0), Some(-1.0)), 0.0);
         assert!(overlap(Some(1.0), Some(0.7)) > 0.95);
         assert!(overlap(Some(1.0), None) > 0.95);
-    }
-
-    #[test]
-    fn the_better_of_two_poses_is_seen_through_less_then_overlaps_more() {
-        let surface = ScanSurface::new(&corner(12, 3), 500, None).unwrap();
-        let overlay = surface.overlay(&surface, &Rigid::identity());
-        let with = |through: f64, overlap: f64| Overlay {
-            overlap_source: overlap,
-            seen_through: Some(through),
-            ..overlay.clone()
-        };
-        assert!(with(0.0, 0.5).is_better(&with(0.01, 0.9)));
-        assert!(with(0.0, 0.6).is_better(&with(0.0, 0.5)) && !with(0.0, 0.5).is_better(&with(0.0, 0.5)));
     }
 
     #[test]

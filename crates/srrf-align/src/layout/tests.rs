@@ -52,6 +52,7 @@ fn walls_say_how_two_scans_of_a_room_lie() {
     let other = exp(&Vector6::new(-2.1, 0.3, 0.8, -4.0, 2.0, 6.0));
     let (from, by_from) = laid_out([1.3, 1.4, 1.5], &one);
     let (to, by_to) = laid_out([1.9, 2.2, 1.6], &other);
+    assert!(from.is_walled() && to.is_walled());
     let right = other.compose(&one.inverse());
     let poses = from.poses(&to, [&by_from, &by_to], 0.06);
     let off = |pose: &Rigid| {
@@ -74,6 +75,22 @@ fn walls_say_how_two_scans_of_a_room_lie() {
     assert!(from.stands(&to, &right));
     let over = exp(&Vector6::new(std::f64::consts::PI, 0.0, 0.0, 0.0, 0.0, 0.0));
     assert!(!from.stands(&to, &other.compose(&over).compose(&one.inverse())));
+}
+
+#[test]
+fn a_ball_and_a_floor_are_no_walls() {
+    let ball: Vec<Vector3<f64>> = (0..3000)
+        .map(|i| {
+            let (z, turn) = (f64::from(2 * i + 1) / 3000.0 - 1.0, 2.4 * f64::from(i));
+            Vector3::new((1.0 - z * z).sqrt() * turn.cos(), (1.0 - z * z).sqrt() * turn.sin(), z)
+        })
+        .collect();
+    let points: Vec<[f64; 3]> = ball.iter().map(|p| (2.0 * p).into()).collect();
+    assert!(!WallLayout::new(points.iter().zip(&ball), &Vector3::zeros(), 0.05).is_walled());
+    let floor: Vec<[f64; 3]> =
+        (0..2500).map(|i| [0.1 * f64::from(i % 50), 0.1 * f64::from(i / 50), 0.0]).collect();
+    let up = vec![Vector3::z(); floor.len()];
+    assert!(!WallLayout::new(floor.iter().zip(&up), &Vector3::new(2.0, 2.0, 1.5), 0.05).is_walled());
 }
 
 #[test]
