@@ -70,7 +70,7 @@ pub struct Consensus {
     /// Loops that close with two or more edges which contradict the map: wrong edges do not agree by chance, so that either these are
     /// right, or places look alike.
     pub rivals: Vec<EdgeLoop>,
-    /// Whether sure pairs turned out wrong so often that none joins by itself.
+    /// Whether sure pairs turned out wrong so often that none joins by itself, or scans cannot be told apart.
     pub look_alike: bool,
 }
 
@@ -87,6 +87,8 @@ pub struct EdgeEvidence<'a> {
     pub vouched: &'a [bool],
     /// Whether the scans show the same whole, so that they may be two of a kind.
     pub twins: &'a [bool],
+    /// Whether one of its scans is one of two in a building that cannot be told apart.
+    pub doubled: &'a [bool],
     /// Short loops of them.
     pub loops: &'a [EdgeLoop],
     /// Whether a loop that closes says nothing.
@@ -119,7 +121,7 @@ pub fn agree(nodes: usize, edges: &[GraphEdge], known: EdgeEvidence<'_>) -> Cons
         }
         lowered = next;
     }
-    let look_alike = lowered <= LOOK_ALIKE;
+    let look_alike = lowered <= LOOK_ALIKE || known.doubled.contains(&true);
     let may_join = joining(edges, &posterior, known, &all, look_alike);
     let joins = likelier_right_than_wrong(nodes, edges, &posterior, may_join, known.vouched);
     let likely: Vec<f64> = posterior.iter().zip(&joins).map(|(p, j)| if *j { *p } else { 0.0 }).collect();
@@ -215,6 +217,7 @@ fn joining(
         .into_iter()
         .enumerate()
         .map(|(e, confirmed)| match () {
+            () if known.doubled[e] => false,
             () if confirmed => posterior[e] >= HALF,
             () if known.abstains[e] => {
                 posterior[e] >= SURE && known.sight[e] > 0.0 && repeated[e] && alone[e]

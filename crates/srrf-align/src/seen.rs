@@ -45,6 +45,7 @@ pub fn consensus_of(surfaces: &[ScanSurface], pool: &PairPool) -> Consensus {
             t.prior > 0.0 && shared >= TWINS && *sight > BLOCKS
         })
         .collect();
+    let doubled = doubled(surfaces, &edges, &twins, &vouched);
     let mut loops = triangles(surfaces.len(), &edges, &prior);
     loops
         .par_iter_mut()
@@ -59,6 +60,7 @@ pub fn consensus_of(surfaces: &[ScanSurface], pool: &PairPool) -> Consensus {
             abstains: &abstains,
             vouched: &vouched,
             twins: &twins,
+            doubled: &doubled,
             loops: &loops,
             implied: &|l| is_implied(surfaces, &edges, l),
         };
@@ -76,6 +78,22 @@ pub fn consensus_of(surfaces: &[ScanSurface], pool: &PairPool) -> Consensus {
         loops.extend(more);
         round += 1;
     }
+}
+
+/// For each edge whether one of its scans has a twin in a building that was taken from the same place, and nobody says that they belong
+/// together. Nobody sets up twice in one place; the walls of two places may be the same, and all around them too: what joins the one
+/// would join the other as well, loops included.
+fn doubled(surfaces: &[ScanSurface], edges: &[GraphEdge], twins: &[bool], vouched: &[bool]) -> Vec<bool> {
+    let one_stand =
+        |e: &GraphEdge| surfaces[e.target].shares_stand(&surfaces[e.source], &e.target_from_source);
+    let mut has_twin = vec![false; surfaces.len()];
+    for (e, edge) in edges.iter().enumerate() {
+        if twins[e] && !vouched[e] && one_stand(edge) {
+            has_twin[edge.source] = true;
+            has_twin[edge.target] = true;
+        }
+    }
+    edges.iter().zip(vouched).map(|(e, v)| !v && (has_twin[e.source] || has_twin[e.target])).collect()
 }
 
 /// Two pairs of one scan that would lay their other scans on each other so that one saw through the other: not both are right.

@@ -22,6 +22,8 @@ pub const ALIKE_MATCHES: f64 = 20.0;
 /// What a scanner saw through lies by this share of the radius and so many spacings in front of what it saw.
 const SIGHT_RADII: f64 = 0.015;
 const SIGHT_SPACINGS: f64 = 0.25;
+/// Scanners nearer to each other than this share of the radius stood in one place.
+const ONE_STAND: f64 = 0.5;
 /// Points of a scan that are asked for its matches.
 const ASKED: usize = 1500;
 /// A right registration is within this share of the radius and this many spacings of the truth, three standard deviations.
@@ -105,6 +107,15 @@ impl ScanSurface {
     /// Whether it is known where its scanner stood, and most of what that saw is walls.
     pub fn is_walled(&self) -> bool {
         self.layout.as_ref().is_some_and(WallLayout::is_walled)
+    }
+
+    /// Whether both are of walls, and a pose puts the scanners in one place: nearer than half a radius.
+    pub fn shares_stand(&self, source: &Self, self_from_source: &Rigid) -> bool {
+        let stands = source.sight().zip(self.sight()).filter(|_| self.is_walled() && source.is_walled());
+        stands.is_some_and(|(from, to)| {
+            let moved = Vector3::from(self_from_source.apply(&from.eye().into()));
+            (moved - to.eye()).norm() < ONE_STAND * self.radius.min(source.radius)
+        })
     }
 
     /// Poses in which the walls of both lie on each other, the best first; none for scans that are not of walls.

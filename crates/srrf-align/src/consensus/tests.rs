@@ -16,6 +16,7 @@ fn agreed(nodes: usize, edges: &[GraphEdge], prior: &[f64], abstains: &[bool]) -
             prior,
             sight: &sight,
             twins: &vec![false; edges.len()],
+            doubled: &vec![false; edges.len()],
             abstains,
             vouched: &vouched,
             loops: &loops,
@@ -126,12 +127,18 @@ fn a_map_is_one_as_long_as_it_is_likelier_right_than_wrong() {
         prior: &prior,
         sight: &sight,
         twins: &[false; 64],
+        doubled: &[false; 64],
         abstains: &none,
         vouched: &vouched,
         loops: &[],
         implied: &|_| false,
     };
     assert_eq!(agree(9, &edges, known).components.len(), 1);
+    // Of two scans that cannot be told apart, none is joined.
+    let doubled: Vec<bool> = (0..64).map(|e| e == 3 || e == 4).collect();
+    let found = agree(9, &edges, EdgeEvidence { doubled: &doubled, ..known });
+    assert_eq!(found.components, [vec![0, 1, 2, 3], vec![5, 6, 7, 8], vec![4]]);
+    assert!(found.look_alike);
 }
 
 #[test]
@@ -151,6 +158,7 @@ fn what_scanners_saw_breaks_a_map() {
         prior: &prior,
         sight: &[0.0; 7],
         twins: &[false; 7],
+        doubled: &[false; 7],
         abstains: &[false; 7],
         vouched: &[false; 7],
         loops: &loops,
@@ -175,6 +183,7 @@ fn edges_that_abstain_join_where_all_was_seen_and_they_say_the_same() {
             prior: &prior,
             sight: &sight,
             twins: &[false; 6],
+            doubled: &[false; 6],
             abstains: &[false, false, false, true, true, true],
             vouched: &[false; 6],
             loops: &loops,
