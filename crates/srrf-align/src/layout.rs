@@ -60,18 +60,14 @@ pub struct WallLayout {
 }
 
 impl WallLayout {
-    /// Of the points of a scan with their normals, and the place of its scanner. Walls are so thick as `width`.
+    /// Of the points of a scan with their normals, which point to its scanner, and the place of that. Walls are so thick as `width`.
     pub fn new<'a>(
         points: impl Iterator<Item = (&'a [f64; 3], &'a Vector3<f64>)>,
         eye: &Vector3<f64>,
         width: f64,
     ) -> Self {
-        let mut left: Vec<(Vector3<f64>, Vector3<f64>)> = points
-            .map(|(p, n)| {
-                let p = Vector3::from(*p);
-                (p, if n.dot(&(eye - p)) < 0.0 { -n } else { *n })
-            })
-            .collect();
+        let mut left: Vec<(Vector3<f64>, Vector3<f64>)> =
+            points.map(|(p, n)| (Vector3::from(*p), *n)).collect();
         let all = left.len();
         let whole = left.clone();
         let probes = left.iter().step_by(all.div_ceil(PROBES).max(1)).copied().collect();
@@ -93,12 +89,7 @@ impl WallLayout {
 
     /// Whether most of the scan is walls, floors and ceilings, and they hold it each way.
     pub fn is_walled(&self) -> bool {
-        let mut axes: Vec<Vector3<f64>> = Vec::new();
-        for face in self.faces.iter().filter(|f| !f.levels.is_empty()) {
-            if axes.iter().all(|a| a.dot(&face.toward).abs() < APART) {
-                axes.push(face.toward);
-            }
-        }
+        let axes = apart(self.faces.iter().filter(|f| !f.levels.is_empty()));
         axes.len() >= 3 && self.faces.iter().map(|f| f.share).sum::<f64>() >= WALLED
     }
 
@@ -188,12 +179,7 @@ impl WallLayout {
 
     /// Translations by the shifts along three directions that lay most walls on walls; none where a direction has no walls in common.
     fn shifts(&self, other: &Self, rotation: &Matrix3<f64>, width: f64) -> Option<Vec<Vector3<f64>>> {
-        let mut axes: Vec<Vector3<f64>> = Vec::new();
-        for (_, face) in self.laid(other, rotation) {
-            if axes.iter().all(|a| a.dot(&face.toward).abs() < APART) {
-                axes.push(face.toward);
-            }
-        }
+        let axes = apart(self.laid(other, rotation).map(|(_, face)| face));
         let [first, second, third] = axes[..] else { return None };
         let back = Matrix3::from_rows(&[first.transpose(), second.transpose(), third.transpose()]);
         let back = back.try_inverse()?;
@@ -250,7 +236,18 @@ impl WallLayout {
     }
 }
 
-/// Cosine of half the angle between two rotations, by which eight degrees are told from none.
+/// Directions that are apart, the first of those that are not.
+fn apart<'a>(faces: impl Iterator<Item = &'a Face>) -> Vec<Vector3<f64>> {
+    let mut axes: Vec<Vector3<f64>> = Vec::new();
+    for face in faces {
+        if axes.iter().all(|a| a.dot(&face.toward).abs() < APART) {
+            axes.push(face.toward);
+        }
+    }
+    axes
+}
+
+/// Cosine of the angle between two rotations.
 fn cosine_between(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
     ((a.transpose() * b).trace() - 1.0) / 2.0
 }

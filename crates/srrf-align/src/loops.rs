@@ -32,6 +32,11 @@ pub struct EdgeLoop {
 }
 
 impl EdgeLoop {
+    /// One that does not close, whatever its motion: scanners saw through what it lays on each other.
+    pub fn contradicted(edges: Vec<usize>) -> Self {
+        Self { edges, error: Rigid::identity(), chi_squared: f64::INFINITY, implied: false }
+    }
+
     /// Whether it closes; `None` where that is not clear.
     pub fn closes(&self) -> Option<bool> {
         if self.implied {

@@ -1,7 +1,6 @@
 //! What registered pairs agree on once what the scanners saw through is held against it.
 
 use rayon::prelude::*;
-use srrf_cloud::Rigid;
 
 use crate::consensus::{Consensus, EdgeEvidence, EdgeVerdict, agree};
 use crate::graph::GraphEdge;
@@ -129,12 +128,7 @@ fn conflicts(surfaces: &[ScanSurface], edges: &[GraphEdge], prior: &[f64], sight
                 return None;
             }
             let share = surfaces[b].seen_through(&surfaces[a], &b_from_a, ASKED)?;
-            (sight.log_ratio(share) < BLOCKS).then(|| EdgeLoop {
-                edges: vec![x, y],
-                error: Rigid::identity(),
-                chi_squared: f64::INFINITY,
-                implied: false,
-            })
+            (sight.log_ratio(share) < BLOCKS).then(|| EdgeLoop::contradicted(vec![x, y]))
         })
         .collect()
 }
@@ -163,12 +157,7 @@ fn seen_through(
             let way = tree.way(a, b).filter(|way| (2..=LONGEST_WAY).contains(&way.len()))?;
             let b_from_a = found.poses[b].inverse().compose(&found.poses[a]);
             let share = surfaces[b].seen_through(&surfaces[a], &b_from_a, ASKED)?;
-            (sight.log_ratio(share) < BLOCKS).then(|| EdgeLoop {
-                edges: way,
-                error: Rigid::identity(),
-                chi_squared: f64::INFINITY,
-                implied: false,
-            })
+            (sight.log_ratio(share) < BLOCKS).then(|| EdgeLoop::contradicted(way))
         })
         .collect()
 }

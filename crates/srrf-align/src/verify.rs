@@ -26,8 +26,6 @@ pub struct Laid {
     pub value: f64,
     /// The larger share of points that lie on the other scan.
     pub overlap: f64,
-    /// The share that a scanner saw through; 0 where no place of a scanner is known.
-    pub seen_through: f64,
 }
 
 /// Lays `source` on `target` near a rough pose between the centred scans. None where the points do not say how.
@@ -81,7 +79,7 @@ fn valued(source: &ScanSurface, target: &ScanSurface, pose: Rigid) -> Laid {
     let overlap = target.overlap(source, &pose, ASKED);
     let seen_through = target.seen_through(source, &pose, SIGHT_ASKED).unwrap_or(0.0);
     let value = overlap.sqrt() / (1.0 + (seen_through / SEEN_THROUGH).powi(2));
-    Laid { target_from_source: pose, value, overlap, seen_through }
+    Laid { target_from_source: pose, value, overlap }
 }
 
 #[cfg(test)]

@@ -5,6 +5,8 @@ use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use srrf_cloud::{CloudError, PointCloud};
 
+use crate::solids::Solids;
+
 /// Metres.
 const ROOM_WIDTH: f64 = 4.5;
 const ROOM_DEPTH: f64 = 5.0;
@@ -14,16 +16,6 @@ const DOOR: [f64; 2] = [0.9, 2.1];
 /// Distance between stations in a corridor.
 const STEP: f64 = 4.0;
 const EYE: f64 = 1.5;
-const FARTHEST: f64 = 30.0;
-
-/// A rectangle across one of the axes.
-#[derive(Debug, Clone, Copy)]
-struct Pane {
-    axis: usize,
-    at: f64,
-    low: [f64; 3],
-    high: [f64; 3],
-}
 
 /// Where a scan is taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,7 +29,7 @@ pub struct ScanPlace {
 /// A building.
 #[derive(Debug, Clone)]
 pub struct Building {
-    panes: Vec<Pane>,
+    solids: Solids,
     stations: Vec<ScanPlace>,
 }
 
@@ -46,13 +38,14 @@ impl Building {
     /// the same furniture each; `loose` small things stand elsewhere in every room.
     pub fn new(a_row: usize, loose: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut building = Self { panes: Vec::new(), stations: Vec::new() };
+        let mut building = Self { solids: Solids::default(), stations: Vec::new() };
         let length = a_row as f64 * ROOM_WIDTH;
         let (first, second) = (0.0, CORRIDOR + 2.0 * ROOM_DEPTH);
         let west = -CORRIDOR;
         let (south, north) = (first - ROOM_DEPTH, second + CORRIDOR + ROOM_DEPTH);
-        building.slab(0.0, [west, south], [length + CORRIDOR, north]);
-        building.slab(HEIGHT, [west, south], [length + CORRIDOR, north]);
+        for z in [0.0, HEIGHT] {
+            building.solids.pane(2, z, [west, south], [length + CORRIDOR, north]);
+        }
         let mut number = 0;
         // Rows from south to north: outside, inside, inside, outside; each with its door towards its corridor.
         for (low, door_at) in [
@@ -92,66 +85,12 @@ impl Building {
         noise: f64,
         seed: u64,
     ) -> Result<PointCloud, CloudError> {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let [columns, rows] = rays;
-        let first: f64 = rng.random_range(0.0..1.0);
-        let mut points = Vec::with_capacity(columns * rows);
-        for column in 0..columns {
-            let turn = std::f64::consts::TAU * (column as f64 + first) / columns as f64;
-            for row in 0..rows {
-                // From 60 degrees below the horizon to 80 above.
-                let up = (-60.0 + 140.0 * (row as f64 + first) / rows as f64).to_radians();
-                let ray = [up.cos() * turn.cos(), up.cos() * turn.sin(), up.sin()];
-                if let Some(range) = self.first_hit(&eye, &ray) {
-                    let off: f64 =
-                        (0..4).map(|_| rng.random_range(-1.0..1.0f64)).sum::<f64>() * noise * 0.866;
-                    points.push(std::array::from_fn(|c| eye[c] + (range + off) * ray[c]));
-                }
-            }
-        }
-        PointCloud::new(points)
-    }
-
-    fn first_hit(&self, eye: &[f64; 3], ray: &[f64; 3]) -> Option<f64> {
-        let mut nearest = FARTHEST;
-        for pane in &self.panes {
-            let range = (pane.at - eye[pane.axis]) / ray[pane.axis];
-            if range > 1e-3 && range < nearest {
-                let inside = (0..3).filter(|c| *c != pane.axis).all(|c| {
-                    let at = eye[c] + range * ray[c];
-                    at >= pane.low[c] && at <= pane.high[c]
-                });
-                if inside {
-                    nearest = range;
-                }
-            }
-        }
-        (nearest < FARTHEST).then_some(nearest)
-    }
-
-    fn slab(&mut self, z: f64, low: [f64; 2], high: [f64; 2]) {
-        self.panes.push(Pane { axis: 2, at: z, low: [low[0], low[1], z], high: [high[0], high[1], z] });
+        self.solids.scan(eye, rays, noise, seed)
     }
 
     /// A wall across `axis` (0 or 1), from floor to ceiling.
     fn wall(&mut self, axis: usize, at: f64, from: f64, to: f64) {
-        self.pane(axis, at, [from, 0.0], [to, HEIGHT]);
-    }
-
-    /// A pane across `axis` (0 or 1) by its extent along the other and in height.
-    fn pane(&mut self, axis: usize, at: f64, low: [f64; 2], high: [f64; 2]) {
-        let corner = |along: f64, z: f64| if axis == 0 { [at, along, z] } else { [along, at, z] };
-        self.panes.push(Pane { axis, at, low: corner(low[0], low[1]), high: corner(high[0], high[1]) });
-    }
-
-    fn thing(&mut self, low: [f64; 3], high: [f64; 3]) {
-        for axis in 0..3 {
-            for at in [low[axis], high[axis]] {
-                let (mut l, mut h) = (low, high);
-                (l[axis], h[axis]) = (at, at);
-                self.panes.push(Pane { axis, at, low: l, high: h });
-            }
-        }
+        self.solids.pane(axis, at, [from, 0.0], [to, HEIGHT]);
     }
 
     /// A room between `x` and the next, its far wall at `far` and its door in the wall at `door_at`.
@@ -161,7 +100,7 @@ impl Building {
         let left = x + [0.5, 1.8, 3.0][kind];
         self.wall(1, door_at, x, left);
         self.wall(1, door_at, left + DOOR[0], x + ROOM_WIDTH);
-        self.pane(1, door_at, [left, DOOR[1]], [left + DOOR[0], HEIGHT]);
+        self.solids.pane(1, door_at, [left, DOOR[1]], [left + DOOR[0], HEIGHT]);
         // Furniture by its distance from the far wall.
         let into = (door_at - far).signum();
         let furniture: &[[f64; 6]] = match kind {
@@ -182,8 +121,7 @@ impl Building {
             ],
         };
         let put = |b: &mut Self, f: [f64; 6]| {
-            let (near, away) = (far + into * f[1], far + into * f[4]);
-            b.thing([x + f[0], near.min(away), f[2]], [x + f[3], near.max(away), f[5]]);
+            b.solids.block([x + f[0], far + into * f[1], f[2]], [x + f[3], far + into * f[4], f[5]]);
         };
         furniture.iter().for_each(|f| put(self, *f));
         for _ in 0..loose {
@@ -216,7 +154,7 @@ impl Building {
                 let side = if rng.random_range(0.0..1.0) < 0.5 { 0.0 } else { CORRIDOR - 0.25 };
                 let (z, tall) = (rng.random_range(0.0..1.2), rng.random_range(0.3..0.9));
                 let wide = rng.random_range(0.2..0.6);
-                self.thing([u, base + side, z], [u + wide, base + side + 0.25, z + tall]);
+                self.solids.block([u, base + side, z], [u + wide, base + side + 0.25, z + tall]);
             }
             let steps = ((east - west + CORRIDOR) / STEP).floor() as usize;
             for i in 0..=steps {

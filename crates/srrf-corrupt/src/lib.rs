@@ -34,6 +34,7 @@ mod normalize;
 mod pairs;
 mod severity;
 pub mod shapes;
+pub mod solids;
 mod variants;
 pub mod views;
 

@@ -112,15 +112,7 @@ impl Stoppable<'_> {
         target_from_source: Option<Rigid>,
     ) -> Result<PairAnswer, srrf::Error> {
         let request = Request { initial: target_from_source, ..Request::new(source, target) };
-        match registrar.register(&request.until(self.stop)) {
-            Ok(found) => Ok(PairAnswer {
-                target_from_source: Some(found.target_from_source),
-                probability: found.probability.get(),
-                abstain: found.abstain,
-            }),
-            Err(srrf::Error::NoPose(_)) => Ok(PairAnswer::NOTHING),
-            Err(other) => Err(other),
-        }
+        registrar.pair_answer(&request.until(self.stop))
     }
 }
 

@@ -25,16 +25,7 @@ impl RegisterPairs for Registrar {
         target: &Target,
         target_from_source: Option<Rigid>,
     ) -> Result<PairAnswer, Error> {
-        let request = Request { initial: target_from_source, ..Request::new(source, target) };
-        match Self::register(self, &request) {
-            Ok(found) => Ok(PairAnswer {
-                target_from_source: Some(found.target_from_source),
-                probability: found.probability.get(),
-                abstain: found.abstain,
-            }),
-            Err(Error::NoPose(_)) => Ok(PairAnswer::NOTHING),
-            Err(other) => Err(other),
-        }
+        self.pair_answer(&Request { initial: target_from_source, ..Request::new(source, target) })
     }
 
     fn refine(
@@ -48,6 +39,22 @@ impl RegisterPairs for Registrar {
 }
 
 impl Registrar {
+    /// As [`register`](Self::register), in the words of an alignment: where no pose is found the answer is nothing.
+    ///
+    /// # Errors
+    /// As [`register`](Self::register), but for [`Error::NoPose`].
+    pub fn pair_answer(&self, request: &Request<'_>) -> Result<PairAnswer, Error> {
+        match self.register(request) {
+            Ok(found) => Ok(PairAnswer {
+                target_from_source: Some(found.target_from_source),
+                probability: found.probability.get(),
+                abstain: found.abstain,
+            }),
+            Err(Error::NoPose(_)) => Ok(PairAnswer::NOTHING),
+            Err(other) => Err(other),
+        }
+    }
+
     /// One with the same options that looks only at first guesses, for targets that this one made ready.
     ///
     /// # Errors

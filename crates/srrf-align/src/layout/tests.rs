@@ -86,7 +86,8 @@ fn a_ball_and_a_floor_are_no_walls() {
         })
         .collect();
     let points: Vec<[f64; 3]> = ball.iter().map(|p| (2.0 * p).into()).collect();
-    assert!(!WallLayout::new(points.iter().zip(&ball), &Vector3::zeros(), 0.05).is_walled());
+    let inward: Vec<Vector3<f64>> = ball.iter().map(|p| -p).collect();
+    assert!(!WallLayout::new(points.iter().zip(&inward), &Vector3::zeros(), 0.05).is_walled());
     let floor: Vec<[f64; 3]> =
         (0..2500).map(|i| [0.1 * f64::from(i % 50), 0.1 * f64::from(i / 50), 0.0]).collect();
     let up = vec![Vector3::z(); floor.len()];

@@ -5,8 +5,7 @@
 
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-
-use crate::solids::{Solids, along};
+use srrf_corrupt::solids::{Solids, along};
 
 /// Metres.
 const ROOM_WIDTH: f64 = 4.5;

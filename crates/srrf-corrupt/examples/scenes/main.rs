@@ -22,7 +22,6 @@ use srrf_corrupt::shapes::ProceduralShapes;
 use srrf_corrupt::views::{anywhere, seen_from, turntable};
 
 mod building;
-mod solids;
 
 use building::Building;
 

@@ -1,6 +1,6 @@
 //! `srrf align`: many scans in, one map out.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -25,6 +25,7 @@ use super::align_scans::{ScanFiles, ScanReading};
 use super::align_summary::{shortened, summary};
 use super::common::unusable;
 use super::method::MethodArgs;
+use super::outputs::Outputs;
 use super::surface::SurfaceArgs;
 
 /// The exit code of a map in which not every scan is placed.
@@ -172,7 +173,7 @@ pub fn run(args: &AlignArgs) -> Result<ExitCode, Failure> {
         out.say(&summary(&map, &scans, begun.elapsed().as_secs_f64()));
     }
     written.lines.iter().for_each(|line| out.say(line));
-    if !written.failed.is_empty() && !written.holds_poses {
+    if !written.failed.is_empty() && !written.holds_answer {
         // Better beside the errors than lost.
         Output::Aside.say(align_poses::to_tum(&map, &scans).trim_end());
     }
@@ -246,35 +247,28 @@ impl AlignArgs {
         Ok(scans)
     }
 
-    /// Writes what was asked for; says what was written. One that fails does not keep the others from being written.
-    fn write(&self, map: &Map, scans: &ScanFiles, registrar: &Registrar, seconds: f64) -> MapOutputs {
-        let mut written = MapOutputs::default();
-        let mut put =
-            |path: Option<&PathBuf>, holds_poses: bool, write: &dyn Fn(&Path) -> Result<String, Failure>| {
-                let Some(path) = path else { return };
-                match write(path) {
-                    Ok(what) => {
-                        written.holds_poses |= holds_poses;
-                        written.lines.push(wrote(path, &what));
-                    }
-                    Err(failure) => written.failed.push(failure),
-                }
-            };
-        put(self.output.as_ref(), true, &|path| {
+    /// Writes what was asked for.
+    fn write(&self, map: &Map, scans: &ScanFiles, registrar: &Registrar, seconds: f64) -> Outputs {
+        let mut written = Outputs::default();
+        written.put(self.output.as_ref(), true, |path| {
             let json = align_poses::to_json(map, scans, &registrar.options().to_string(), seconds);
             files::write(path, format!("{json:#}\n").as_bytes())?;
             Ok("all poses and figures".to_owned())
         });
-        put(self.tum.as_ref(), true, &|path| {
+        written.put(self.tum.as_ref(), true, |path| {
             files::write(path, align_poses::to_tum(map, scans).as_bytes())?;
             Ok("the poses of the largest map, as TUM".to_owned())
         });
-        put(self.kitti.as_ref(), true, &|path| {
+        written.put(self.kitti.as_ref(), true, |path| {
             files::write(path, align_poses::to_kitti(map)?.as_bytes())?;
             Ok("the poses, as KITTI".to_owned())
         });
-        put(self.merge.save.as_ref(), false, &|path| Ok(merge(map, scans, &self.merge, path)?.words()));
-        put(self.moved.as_ref(), false, &|folder| {
+        written.put(
+            self.merge.save.as_ref(),
+            false,
+            |path| Ok(merge(map, scans, &self.merge, path)?.words()),
+        );
+        written.put(self.moved.as_ref(), false, |folder| {
             let copies = align_moved::write(map, scans, folder)?;
             let mut what =
                 format!("{}, moved into the frame of the largest map", counted(copies.written, "file"));
@@ -283,26 +277,12 @@ impl AlignArgs {
             }
             Ok(what)
         });
-        put(self.html.as_ref(), false, &|path| {
+        written.put(self.html.as_ref(), false, |path| {
             files::write(path, align_page::page(map, scans)?.as_bytes())?;
             Ok("open it in a browser".to_owned())
         });
         written
     }
-}
-
-/// What became of the outputs.
-#[derive(Debug, Default)]
-struct MapOutputs {
-    lines: Vec<String>,
-    failed: Vec<Failure>,
-    /// Whether the poses are in one of them.
-    holds_poses: bool,
-}
-
-fn wrote(path: &Path, what: &str) -> String {
-    let name = if files::is_stream(path) { "standard output".to_owned() } else { path.display().to_string() };
-    format!("wrote {name}: {what}")
 }
 
 /// The failure behind an error of the library, which knows no files.

@@ -23,6 +23,7 @@ mod batch;
 mod common;
 mod inspect;
 mod method;
+mod outputs;
 mod page;
 mod poses;
 mod register;

@@ -12,6 +12,7 @@ use srrf_cloud::pose::PoseNote;
 
 use super::common::{EXIT_CODES, answer, failed, unusable, warnings_of};
 use super::method::MethodArgs;
+use super::outputs::Outputs;
 use super::page::{self, PageArgs};
 use super::poses::{PoseReading, PoseWriting, described, looks_inverted};
 use super::scale::{self, ScaleArgs};
@@ -139,10 +140,7 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
     outcome.warnings.extend(initial.and_then(|pose| looks_inverted(&pose, &source.cloud, &target.cloud)));
 
     let written = if outcome.abstain && args.require_answer {
-        PairOutputs {
-            lines: vec!["--require-answer: nothing was written".to_owned()],
-            ..PairOutputs::default()
-        }
+        Outputs { lines: vec!["--require-answer: nothing was written".to_owned()], ..Outputs::default() }
     } else {
         args.write(&outcome, &source, &target, initial.as_ref(), &progress)
     };
@@ -152,7 +150,7 @@ pub fn run(args: &RegisterArgs) -> Result<ExitCode, Failure> {
         out.say(&summary::text(&outcome, &source, &target, begun.elapsed().as_secs_f64()));
         written.lines.iter().for_each(|line| out.say(line));
     }
-    if let Some(failure) = written.failure(&outcome.target_from_source) {
+    if let Some(failure) = failure_of(written, &outcome.target_from_source) {
         return Err(failure);
     }
     Ok(if outcome.abstain { ExitCode::from(ABSTAINED) } else { ExitCode::SUCCESS })
@@ -199,7 +197,7 @@ impl RegisterArgs {
         checked.map_err(|failure| failure.at("--save"))
     }
 
-    /// Writes what was asked for; says what was written. One that fails does not keep the others from being written.
+    /// Writes what was asked for.
     fn write(
         &self,
         outcome: &Outcome,
@@ -207,19 +205,14 @@ impl RegisterArgs {
         target: &Input,
         initial: Option<&Rigid>,
         progress: &Progress,
-    ) -> PairOutputs {
-        let mut written = PairOutputs::default();
+    ) -> Outputs {
+        let mut written = Outputs::default();
         let mut put =
-            |path: Option<&PathBuf>, holds_pose: bool, write: &dyn Fn(&Path) -> Result<String, Failure>| {
-                let Some(path) = path else { return };
-                progress.step(format!("writing {path:?}"));
-                match write(path) {
-                    Ok(what) => {
-                        written.holds_pose |= holds_pose;
-                        written.lines.push(wrote(path, &what));
-                    }
-                    Err(failure) => written.failed.push(failure),
-                }
+            |path: Option<&PathBuf>, is_answer: bool, write: &dyn Fn(&Path) -> Result<String, Failure>| {
+                written.put(path, is_answer, |path| {
+                    progress.step(format!("writing {path:?}"));
+                    write(path)
+                });
             };
         put(self.output.as_ref(), true, &|path| self.write_pose(path, outcome));
         put(self.json.as_ref(), true, &|path| {
@@ -254,24 +247,13 @@ impl RegisterArgs {
     }
 }
 
-/// What became of the outputs.
-#[derive(Debug, Default)]
-struct PairOutputs {
-    lines: Vec<String>,
-    failed: Vec<Failure>,
-    /// Whether the pose is in one of them.
-    holds_pose: bool,
-}
-
-impl PairOutputs {
-    /// The failure of the outputs that could not be written, with the pose where no file has it.
-    fn failure(self, pose: &Rigid) -> Option<Failure> {
-        let rows = pose.to_matrix4();
-        let row = |i: usize| format!("{:?}", [0, 1, 2, 3].map(|j| rows[(i, j)]));
-        let matrix = [0, 1, 2, 3].map(row).join(", ");
-        let left = (!self.holds_pose).then(|| format!("the pose that was found is [{matrix}]"));
-        Failure::of_outputs(self.failed, left)
-    }
+/// The failure of the outputs that could not be written, with the pose where no file has it.
+fn failure_of(written: Outputs, pose: &Rigid) -> Option<Failure> {
+    let rows = pose.to_matrix4();
+    let row = |i: usize| format!("{:?}", [0, 1, 2, 3].map(|j| rows[(i, j)]));
+    let matrix = [0, 1, 2, 3].map(row).join(", ");
+    let left = (!written.holds_answer).then(|| format!("the pose that was found is [{matrix}]"));
+    Failure::of_outputs(written.failed, left)
 }
 
 /// Writes the source, moved and maybe scaled.
@@ -291,9 +273,4 @@ fn save(path: &Path, outcome: &Outcome, source: &Input) -> Result<String, Failur
 fn kept_words(what: &str, kept: &Kept, whole: bool) -> String {
     let kept = if whole { kept.to_string() } else { "and nothing else".to_owned() };
     if kept.is_empty() { what.to_owned() } else { format!("{what} {kept}") }
-}
-
-fn wrote(path: &Path, what: &str) -> String {
-    let name = if files::is_stream(path) { "standard output".to_owned() } else { path.display().to_string() };
-    format!("wrote {name}: {what}")
 }

@@ -74,7 +74,8 @@ impl Solids {
                 let up = (low + (high - low) * (row as f64 + first) / rows as f64).to_radians();
                 let ray = [up.cos() * turn.cos(), up.cos() * turn.sin(), up.sin()];
                 if let Some(range) = self.first_hit(&eye, &ray) {
-                    let off = noise * 0.866 * (0..4).map(|_| rng.random_range(-1.0..1.0f64)).sum::<f64>();
+                    let off: f64 =
+                        (0..4).map(|_| rng.random_range(-1.0..1.0f64)).sum::<f64>() * noise * 0.866;
                     points.push(std::array::from_fn(|c| eye[c] + (range + off) * ray[c]));
                 }
             }
