@@ -16,6 +16,11 @@ certain, and the rows say how the methods compare, not what can be reached.
 
 Open3D: FPFH + RANSAC + point-to-plane ICP as in scans.py; the voxel (of 0.04 to 0.13) and the distance of ICP (of 0.4 to 2 voxels)
 are the best on 120 such pairs of other meshes (robosuite's).
+
+`--pairs DIR` writes the pairs and a table of them, and registers nothing: what the probability was fitted on is
+
+    python3 scripts/other_meshes.py ROBOSUITE --wheels robosuite==1.5.2 --meshes 60 --seed 11 --pairs DIR
+    cargo run -p srrf-calibrate --bin calibrate -- --scenes DIR/pairs.csv ...
 """
 
 import argparse
@@ -138,6 +143,19 @@ class Rows:
         return source, target @ pose[:3, :3].T + pose[:3, 3], pose
 
 
+def write(folder, pairs, meshes):
+    """Clouds, poses and a table `name,source,target,pose,kind`; no file is replaced."""
+    folder.mkdir(parents=True)
+    lines = ["name,source,target,pose,kind"]
+    for i, (name, source, target, pose) in enumerate(pairs):
+        for which, points in (("x", source), ("y", target)):
+            scans.o3d.io.write_point_cloud(str(folder / f"{i}{which}.ply"), scans.cloud(points))
+        np.savetxt(folder / f"{i}.txt", pose)
+        lines.append(f"mesh{i % meshes} {name},{i}x.ply,{i}y.ply,{i}.txt,mesh: {name}")
+    (folder / "pairs.csv").write_text("\n".join(lines) + "\n")
+    print(f"{len(pairs)} pairs in {folder / 'pairs.csv'}")
+
+
 TEXT = """\
 40 meshes of two packages that nothing here was trained or tuned on: MetaWorld's household objects, dm_control's bones and robot
 parts. Each is sampled twice, each sample is damaged on its own by a generator in numpy, the target is turned by any rotation. The
@@ -158,12 +176,15 @@ def main():
     parser.add_argument("--voxel", type=float, default=0.06, help="of Open3D; the clouds have a radius of about 0.6")
     parser.add_argument("--rotation", choices=["45", "so3"], default="so3", help="what srrf is told of the rotation")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--pairs", type=pathlib.Path, metavar="DIR", help="write the pairs and a table of them here, register nothing")
     parser.add_argument("--book", type=pathlib.Path, metavar="DIR", help="write other-meshes.md and other-meshes.json here")
     arguments = parser.parse_args()
     scans.o3d.utility.set_verbosity_level(scans.o3d.utility.VerbosityLevel.Error)
     shapes = meshes(arguments.folder, arguments.wheels, arguments.meshes)
     rows = Rows(np.random.default_rng(arguments.seed))
     pairs = [(name, *rows.pair(mesh, work)) for name, work in rows.names.items() for mesh in shapes]
+    if arguments.pairs:
+        return write(arguments.pairs, pairs, len(shapes))
 
     command = f"python3 scripts/other_meshes.py MESHES --srrf PROGRAM --seed {arguments.seed} --book book/src/generated"
     page = scans.Page("Meshes of another world", command)

@@ -28,6 +28,7 @@ mod assess;
 mod chance;
 mod config;
 mod deformation;
+mod elsewhere;
 mod evidence;
 mod freedom;
 mod matching;
@@ -46,7 +47,7 @@ mod twist;
 mod verdict;
 
 pub use affine::AffineFit;
-pub use alternatives::Alternative;
+pub use alternatives::{Alternative, Challengers};
 pub use assess::Assessment;
 pub use chance::Chance;
 pub use config::{Deformed, Metric, Ranking, RefineConfig, RefineError};

@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 use srrf_cloud::{PointCloud, Rigid, Solid};
 
-use crate::alternatives::{Alternative, alternatives};
+use crate::alternatives::{Alternative, Challengers};
 use crate::assess::{Assessment, assess};
 use crate::evidence::{Evidence, evidence};
 use crate::prepared::RefineCloud;
@@ -67,15 +67,8 @@ impl RefineTarget {
         assess(&source.prepared, &self.prepared, pose, &self.config)
     }
 
-    /// Other poses that may fit as well: by symmetries of the smaller cloud, by shifts of lattices, and among `rivals`. Those that only
-    /// move along what `assessed` leaves open are left out. Best first.
-    pub fn alternatives(
-        &self,
-        source: &RefineSource,
-        pose: &Rigid,
-        assessed: &Assessment,
-        rivals: &[Rigid],
-    ) -> Vec<Alternative> {
+    /// Poses that challenge one: by symmetries of the smaller cloud, by shifts of lattices, and by turns about the middle of the overlap.
+    pub fn challengers(&self, source: &RefineSource, pose: &Rigid) -> Challengers {
         let run = self.run(source);
         // The smaller cloud is the body; both have their mean at the origin.
         let moved = run.local(pose);
@@ -90,7 +83,19 @@ impl RefineTarget {
                 self.symmetries.get_or_init(|| symmetries(self.prepared.coarse(), self.prepared.radius));
             known.iter().map(|r| turn(r).compose(&moved)).collect()
         };
-        alternatives(&run, &moved, turned, &assessed.freedom, rivals)
+        Challengers::new(&run, &moved, turned)
+    }
+
+    /// Other poses that may fit as well: among those that challenge a pose, and among `rivals`. Those that only move along what
+    /// `assessed`, the assessment of the pose, leaves open are left out. Best first.
+    pub fn alternatives(
+        &self,
+        source: &RefineSource,
+        challengers: &Challengers,
+        assessed: &Assessment,
+        rivals: &[Rigid],
+    ) -> Vec<Alternative> {
+        challengers.alternatives(&self.run(source), &assessed.freedom, rivals)
     }
 
     /// Refines the best of `starts`: poses that map the source near the target.

@@ -49,7 +49,7 @@ pub struct Features {
     pub unbounded_share: f64,
     /// Weight of the pose among all that fit as well: 1 where it is the only one.
     pub share_of_poses: f64,
-    /// Rank of the best pose that a symmetry of the clouds, a shift or another start leads to, over that of this one; at most 2.
+    /// Rank of the best pose that a symmetry of the clouds, a turn, a shift or another start leads to, over that of this one; at most 2.
     pub challenger: f64,
     /// Share that lies within a point spacing by chance, the mean of both clouds.
     pub chance_share: f64,
@@ -112,8 +112,8 @@ impl Features {
         }
     }
 
-    /// The numbers, in the order in which the calibration weighs them. Whether other starts agree and how its own start ranked are none
-    /// of them, since an answer from a good first guess has one start, which is not moved.
+    /// The numbers, in the order in which the calibration weighs them. Whether other starts agree is none of them,
+    /// since an answer from a good first guess has one start, which is not moved; the share among poses is a bound of its own.
     fn values(&self) -> [f64; 15] {
         [
             self.fitness,
@@ -128,8 +128,8 @@ impl Features {
             (self.least_margin.max(0.0) / LIMIT).sqrt(),
             self.affine_gain,
             self.affine_bend,
-            self.rival_support.max(self.challenger).min(2.0),
-            self.share_of_poses.max(LEAST_SHARE).ln(),
+            self.challenger.min(2.0),
+            self.rival_support.min(2.0),
             self.certain_share.max(LEAST_SHARE).ln(),
         ]
     }
@@ -229,29 +229,13 @@ mod tests {
         .map(|(i, name)| ((*name).to_owned(), (i as f64).into()))
         .collect();
         let features: Features = serde_json::from_value(numbered.into()).unwrap();
-        let logarithms = [14f64.ln(), 12f64.ln()];
-        let want = [
-            0.0,
-            1.0,
-            2.0,
-            3.0,
-            4.0,
-            5.0,
-            8.0,
-            16.0,
-            0.1,
-            0.11f64.sqrt(),
-            17.0,
-            18.0,
-            2.0,
-            logarithms[0],
-            logarithms[1],
-        ];
+        let want =
+            [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 8.0, 16.0, 0.1, 0.11f64.sqrt(), 17.0, 18.0, 2.0, 2.0, 12f64.ln()];
         assert_eq!(features.values(), want);
         let all = features.expanded();
         assert_eq!((all.len(), all[15 + 6]), (15 + 15 + 15 * 14 / 2, 64.0));
         // The products begin with that of the first two, and end with that of the last two.
-        assert_eq!((all[30 + 14], all[all.len() - 1]), (2.0, logarithms[0] * logarithms[1]));
+        assert_eq!((all[30 + 14], all[all.len() - 1]), (2.0, 2.0 * 12f64.ln()));
         assert!(Features { challenger: f64::NAN, ..features }.expanded()[0].is_nan());
     }
 }

@@ -67,9 +67,11 @@ pub fn ceiling(features: &Features) -> f64 {
 }
 
 /// What endless motions and other poses that fit as well allow to be sure of, in [0, 1]. A motion that ends somewhere fits worst there, and
-/// the truth is seldom at an end: how much it counts is for the regression to say.
+/// the truth is seldom at an end: how much it counts is for the regression to say. Where clouds look deformed the answer is a start, and other
+/// poses that fit better are no better guesses.
 fn allowed(features: &Features) -> f64 {
-    features.share_of_poses.min(features.unbounded_share).min(1.0)
+    let among_poses = if features.deformed > 0.0 { 1.0 } else { features.share_of_poses };
+    among_poses.min(features.unbounded_share).min(1.0)
 }
 
 /// The probability that clouds with so many false alarms, of which this is the logarithm, do not agree by chance.

@@ -18,12 +18,15 @@ pub struct CandidatePose {
 }
 
 impl CandidatePose {
-    /// The answer and its alternatives; `undo` gives back the coordinates of the input.
+    /// The answer and its alternatives; `undo` gives back the coordinates of the input. Those have at most what the answer leaves, by
+    /// their weights, and none more than its weight has against that of the answer.
     pub(crate) fn all(answer: Self, others: &[Alternative], undo: impl Fn(&Rigid) -> Rigid) -> Vec<Self> {
         let weight = |other: &Alternative| other.log_weight.exp();
-        let largest = others.iter().map(weight).fold(1.0, f64::max);
+        let (largest, sum) = others.iter().map(weight).fold((1.0, 0.0), |(m, s), w| (f64::max(m, w), s + w));
+        let p = answer.probability.get();
+        let for_each = if sum > 0.0 { p.min((1.0 - p) / sum) } else { p };
         let listed = others.iter().filter(|o| weight(o) >= LISTED * largest).filter_map(|other| {
-            let probability = Probability::new(answer.probability.get() * weight(other))?;
+            let probability = Probability::new(for_each * weight(other))?;
             Some(Self { target_from_source: undo(&other.target_from_source), probability })
         });
         std::iter::once(answer).chain(listed).collect()

@@ -2,7 +2,8 @@
 
 use srrf_cloud::Rigid;
 use srrf_refine::{
-    Alternative, Assessment, Evidence, RefineError, RefineTarget, Refinement, StartSupport, Verdict,
+    Alternative, Assessment, Challengers, Evidence, RefineError, RefineTarget, Refinement, StartSupport,
+    Verdict,
 };
 
 use crate::clock::StageClock;
@@ -51,6 +52,16 @@ pub(crate) struct Learned {
     pub times: Vec<StageTime>,
 }
 
+/// The full run of a start, and what its end is compared with.
+#[derive(Debug)]
+struct FullRun {
+    /// Number of the start.
+    of: usize,
+    refinement: Refinement,
+    assessment: Assessment,
+    challengers: Challengers,
+}
+
 /// The starts of one pair. Each gets one short run, whichever round it comes in, and the full run is made
 /// anew only where a later round has a better start.
 pub(crate) struct Search<'a> {
@@ -62,8 +73,8 @@ pub(crate) struct Search<'a> {
     supports: Vec<StartSupport>,
     /// Less likely starts, for the wide round.
     spare: Vec<Proposal>,
-    /// Full runs so far, each after the number of its start; that of the first round comes first.
-    refined: Vec<(usize, Refinement, Assessment)>,
+    /// Full runs so far; that of the first round comes first.
+    refined: Vec<FullRun>,
     network: Option<CoarsePose>,
     warnings: Vec<Warning>,
 }
@@ -145,7 +156,8 @@ impl<'a> Search<'a> {
         let evidence = self.target().evidence(&self.pair.refine, &pose);
         let assessment = self.target().assess(&self.pair.refine, &pose);
         let rank = self.supports[best].rank;
-        let alternatives = self.alternatives(&pose, &assessment);
+        let challengers = self.target().challengers(&self.pair.refine, &pose);
+        let alternatives = self.alternatives(&challengers, &assessment);
         let rivals = Rivals { starts: &self.rivals(), own: best, alternatives: &alternatives };
         let features = Features::new(&evidence, None, &assessment, &pose, rank, &rivals);
         Best {
@@ -160,29 +172,31 @@ impl<'a> Search<'a> {
     }
 
     fn refined(&mut self, best: usize) -> Result<Best, RefineError> {
-        let known = self.refined.iter().position(|(start, ..)| *start == best).or_else(|| {
+        let known = self.refined.iter().position(|run| run.of == best).or_else(|| {
             // Of another start on its way to the same pose, the full run would end there too.
             let pose = &self.supports[best].target_from_source;
-            let there = |run: &Refinement| self.alike(&run.target_from_source, pose, SAME_DEG, SAME);
-            self.refined.iter().position(|(_, run, _)| !self.pair.is_small() && there(run))
+            let there = |run: &FullRun| self.alike(&run.refinement.target_from_source, pose, SAME_DEG, SAME);
+            self.refined.iter().position(|run| !self.pair.is_small() && there(run))
         });
         let run = match known {
             Some(run) => run,
             None => {
-                let run = self.target().finish(&self.pair.refine, &self.supports)?;
-                let assessment = self.target().assess(&self.pair.refine, &run.target_from_source);
-                self.refined.push((best, run, assessment));
+                let refinement = self.target().finish(&self.pair.refine, &self.supports)?;
+                let pose = &refinement.target_from_source;
+                let assessment = self.target().assess(&self.pair.refine, pose);
+                let challengers = self.target().challengers(&self.pair.refine, pose);
+                self.refined.push(FullRun { of: best, refinement, assessment, challengers });
                 self.refined.len() - 1
             }
         };
-        let stands = if self.refined[run].1.verdict == Verdict::Deformed { 0 } else { run };
-        let (from, refined, assessment) = &self.refined[stands];
+        let stands = if self.refined[run].refinement.verdict == Verdict::Deformed { 0 } else { run };
+        let FullRun { of, refinement, assessment, challengers } = &self.refined[stands];
         let assessment = assessment.clone();
-        let refined = Refinement { starts: self.supports.clone(), ..refined.clone() };
+        let refined = Refinement { starts: self.supports.clone(), ..refinement.clone() };
         let (pose, start, evidence) =
             (refined.target_from_source, self.starts[refined.start], refined.evidence.clone());
-        let rank = self.supports[*from].rank;
-        let alternatives = self.alternatives(&pose, &assessment);
+        let rank = self.supports[*of].rank;
+        let alternatives = self.alternatives(challengers, &assessment);
         let rivals = Rivals { starts: &self.rivals(), own: refined.start, alternatives: &alternatives };
         let features = Features::new(&evidence, Some(&refined), &assessment, &pose, rank, &rivals);
         Ok(Best { pose, start, refinement: Some(refined), evidence, assessment, alternatives, features })
@@ -210,13 +224,13 @@ impl<'a> Search<'a> {
         &self.pair.target.0.refine
     }
 
-    /// Other poses that may fit as well as an answer: by its symmetries, and the best of the starts.
-    fn alternatives(&self, pose: &Rigid, assessment: &Assessment) -> Vec<Alternative> {
+    /// Other poses that may fit as well as an answer: what challenges it, and the best of the starts.
+    fn alternatives(&self, challengers: &Challengers, assessment: &Assessment) -> Vec<Alternative> {
         let mut rivals = self.rivals();
         rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
         let best = rivals.first().map_or(0.0, |(_, rank)| *rank);
         let close = rivals.into_iter().take_while(|(_, rank)| *rank >= RIVAL * best).map(|(pose, _)| pose);
-        self.target().alternatives(&self.pair.refine, pose, assessment, &close.collect::<Vec<_>>())
+        self.target().alternatives(&self.pair.refine, challengers, assessment, &close.collect::<Vec<_>>())
     }
 
     /// The poses of all starts with their ranks.

@@ -5,9 +5,10 @@
 //! N pairs (default 1,200) to fit and a quarter as many to measure, of other seeds and other shapes: corrupted, cropped, seen from one
 //! side, few and unrelated points, scales apart, by several methods, with and without a first guess. `--modelnet` adds the shapes
 //! of ModelNet40's training split that the network was validated on; `--scenes` adds the public scans of a table
-//! (`name,source,target,pose,kind`), every other one for measuring only. No test shape is looked at.
+//! (`name,source,target,pose,kind`), every other one for measuring only, and the pairs of meshes that `scripts/other_meshes.py --pairs`
+//! writes. No test shape is looked at.
 //! The answers are kept in the folder of `--cache`, so that a fit takes seconds; remove it where the program changed.
-//! `--write` replaces `crates/srrf/src/calibration.json`. After building again, `--measure` asks the pairs to measure alone, in a new
+//! `--write` replaces `crates/srrf/src/calibration.json`, `--kept` fits on kept answers alone. After building again, `--measure` asks the pairs to measure alone, in a new
 //! folder, and `--book DIR` writes what the program says of them into the book.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program that prints")]
 
@@ -54,6 +55,10 @@ struct Arguments {
     /// Replace the calibration in the program
     #[arg(long)]
     write: bool,
+    /// Fit on the answers that are kept, and ask for no others: after a change of the features the program has no calibration that it
+    /// could answer with
+    #[arg(long, conflicts_with = "measure")]
+    kept: bool,
     /// Penalty on the squares of the weights
     #[arg(long, default_value_t = 10.0)]
     ridge: f64,
@@ -92,7 +97,7 @@ fn main() {
         of_fit.len(),
         SEEDS[0],
         if arguments.modelnet.is_some() { ", validation shapes of ModelNet40's training split" } else { "" },
-        if arguments.scenes.is_empty() { "" } else { ", public scans" },
+        if arguments.scenes.is_empty() { "" } else { ", public scans and meshes" },
     );
     let model = Logistic::fit(&of_fit, arguments.ridge, what).unwrap();
     let says = |e: &Example| Judge::with(model.clone()).judge(&e.features).probability.get();
@@ -132,6 +137,9 @@ fn examples(arguments: &Arguments) -> Vec<Example> {
     let answer = |key: String, held_out: bool, make: &dyn Fn() -> Option<Case>| -> Option<Example> {
         if let Some(example) = known.get(&key) {
             return Some(example.clone());
+        }
+        if arguments.kept {
+            return None;
         }
         let case = make()?;
         let registrar = {
@@ -183,7 +191,7 @@ fn examples(arguments: &Arguments) -> Vec<Example> {
         .collect();
     for table in &arguments.scenes {
         for scene in scenes::read(table).unwrap().into_iter().filter(|s| s.held_out() || !arguments.measure) {
-            let tries = (0..4).filter_map(|number| {
+            let tries = (0..scene.tries()).filter_map(|number| {
                 answer(format!("{} {number}", scene.name), scene.held_out(), &|| Some(scene.case(number)))
             });
             all.extend(tries);

@@ -26,7 +26,7 @@ pub enum Group {
     Corrupted,
     /// Crops and views from one side.
     Partial,
-    /// Built-in shapes, whose families ModelNet40 does not have, lightly corrupted.
+    /// Built-in shapes, whose families ModelNet40 does not have, lightly corrupted, and pairs of meshes of a table.
     Meshes,
     /// Point sets that have nothing in common, and small ones that are copies.
     Few,
@@ -92,17 +92,22 @@ pub fn case(item: u64, part: usize, shapes: &Shapes<'_>) -> Option<Case> {
     };
     let any = rng.random_bool(0.6);
     let rotation = if any { RotationRange::Any } else { RotationRange::Within45 };
-    let method = match rng.random_range(0..10) {
-        0..3 => Method::Auto,
-        3..7 => Method::FpfhRansac,
-        _ => Method::Given,
-    };
+    let method = drawn_method(rng);
     let initial = (method == Method::Given).then(|| guess(truth.as_ref(), rng)).flatten();
     Some(Case { group, kind, source, target, truth, initial, way: Way { method, rotation } })
 }
 
+/// The default method three times in ten; the others are cheaper.
+pub fn drawn_method(rng: &mut ChaCha8Rng) -> Method {
+    match rng.random_range(0..10) {
+        0..3 => Method::Auto,
+        3..7 => Method::FpfhRansac,
+        _ => Method::Given,
+    }
+}
+
 /// A first guess that is good three times in five, and none or a poor one else.
-fn guess(truth: Option<&Rigid>, rng: &mut ChaCha8Rng) -> Option<Rigid> {
+pub fn guess(truth: Option<&Rigid>, rng: &mut ChaCha8Rng) -> Option<Rigid> {
     let truth = truth?;
     let degrees: f64 = match rng.random_range(0..5) {
         0..3 => rng.random_range(0.0..12.0),

@@ -1,4 +1,5 @@
-//! Public scan pairs: a table `name,source,target,pose,kind,...` with files of clouds and poses beside it.
+//! Public scan pairs, and pairs of meshes: a table `name,source,target,pose,kind,...` with files of clouds and poses beside it. Pairs whose
+//! kind begins with `mesh` are of [`Group::Meshes`]; the first word of their name is the mesh.
 
 use std::path::Path;
 
@@ -11,7 +12,7 @@ use srrf_cloud::io::read_cloud;
 use srrf_cloud::{PointCloud, Rigid};
 use srrf_corrupt::crop::random_direction;
 
-use crate::pairs::{Case, Group, Way};
+use crate::pairs::{Case, Group, Way, drawn_method, guess};
 
 /// A row of the table.
 pub struct Scene {
@@ -60,10 +61,32 @@ fn matrix(path: &Path) -> Result<Rigid, Box<dyn std::error::Error>> {
 }
 
 impl Scene {
-    /// Try `number` of this pair: 0 as given, 1 and 2 turned by anything, 3 from a good first guess.
+    fn is_mesh(&self) -> bool {
+        self.kind.starts_with("mesh")
+    }
+
+    /// How often this pair is tried.
+    pub fn tries(&self) -> u64 {
+        if self.is_mesh() { 1 } else { 4 }
+    }
+
+    /// Try `number` of this pair: 0 as given, 1 and 2 turned by anything, 3 from a good first guess. Of meshes, which are turned by
+    /// anything as they are, one try, by one of the methods.
     pub fn case(&self, number: u64) -> Case {
         let seed = self.name.bytes().fold(number, |h, b| h.wrapping_mul(31).wrapping_add(u64::from(b)));
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        if self.is_mesh() {
+            let method = drawn_method(&mut rng);
+            return Case {
+                group: Group::Meshes,
+                kind: self.kind.clone(),
+                source: self.source.clone(),
+                target: self.target.clone(),
+                truth: self.truth,
+                initial: (method == Method::Given).then(|| guess(self.truth.as_ref(), &mut rng)).flatten(),
+                way: Way { method, rotation: RotationRange::Any },
+            };
+        }
         let turn = if number == 1 || number == 2 {
             let axis = random_direction(&mut rng) * rng.random_range(0.5..std::f64::consts::PI);
             Rigid { rotation: Rotation3::from_scaled_axis(axis).into_inner(), ..Rigid::identity() }
@@ -88,8 +111,8 @@ impl Scene {
         }
     }
 
-    /// Whether it is for measuring only: every other one, by its name.
+    /// Whether it is for measuring only: every other one, by the first word of its name.
     pub fn held_out(&self) -> bool {
-        self.name.bytes().map(u64::from).sum::<u64>() % 2 == 1
+        self.name.split(' ').next().unwrap_or_default().bytes().map(u64::from).sum::<u64>() % 2 == 1
     }
 }
