@@ -83,7 +83,7 @@ pub trait RegisterPairs: Sync {
 pub struct PairAnswer {
     /// The pose, in input coordinates; none where no pose was found.
     pub target_from_source: Option<Rigid>,
-    /// Probability that it is right, in [0, 1].
+    /// Probability that it is right as far as its fit tells, in [0, 1]: what other poses fit as well, other scans tell better than the pair.
     pub probability: f64,
     /// Whether that is too little.
     pub abstain: bool,

@@ -39,7 +39,8 @@ impl RegisterPairs for Registrar {
 }
 
 impl Registrar {
-    /// As [`register`](Self::register), in the words of an alignment: where no pose is found the answer is nothing.
+    /// As [`register`](Self::register), in the words of an alignment: where no pose is found the answer is nothing, and the
+    /// probability is that of the fit alone, since which of the poses that fit as well is right is for the other scans to say.
     ///
     /// # Errors
     /// As [`register`](Self::register), but for [`Error::NoPose`].
@@ -47,8 +48,8 @@ impl Registrar {
         match self.register(request) {
             Ok(found) => Ok(PairAnswer {
                 target_from_source: Some(found.target_from_source),
-                probability: found.probability.get(),
-                abstain: found.abstain,
+                probability: found.probability_of_fit.get(),
+                abstain: found.probability_of_fit < self.options().abstain_below,
             }),
             Err(Error::NoPose(_)) => Ok(PairAnswer::NOTHING),
             Err(other) => Err(other),

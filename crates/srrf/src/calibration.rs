@@ -1,4 +1,4 @@
-//! [`Logistic`]: the probability that a pose is right, from the evidence of its own fit.
+//! [`Calibration`]: the probability that a pose is right, from its fit and from the other poses that fit as well.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -9,17 +9,45 @@ use crate::probability::Probability;
 /// What is wrong with the calibration in the program.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
-    /// It is no JSON of a [`Logistic`].
+    /// It is no JSON of a [`Calibration`].
     #[error("calibration.json: {0}")]
     Format(#[source] serde_json::Error),
     /// It was fitted to other features.
-    #[error("calibration.json holds {have} weights where there are {need} features")]
+    #[error("calibration.json holds {have} weights of a regression where there are {need} features")]
     Length {
         /// Numbers in the file.
         have: usize,
         /// Numbers that the features need.
         need: usize,
     },
+}
+
+/// What the program knows of how often answers are right.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibration {
+    /// From the fit of a pose and the other poses that fit as well.
+    pub among_others: Logistic,
+    /// From its fit alone ([`Features::alone`]), for those who know more of the other poses than two clouds tell.
+    pub alone: Logistic,
+}
+
+impl Calibration {
+    /// The one in the program.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if the file in the program was damaged at build time.
+    pub fn embedded() -> Result<Self, CalibrationError> {
+        let both: Self =
+            serde_json::from_str(include_str!("calibration.json")).map_err(CalibrationError::Format)?;
+        let need = Features::default().expanded().len();
+        let models = [&both.among_others, &both.alone];
+        let lengths = models.map(|m| [m.mean.len(), m.deviation.len(), m.weights.len()]);
+        match lengths.as_flattened().iter().copied().find(|n| *n != need) {
+            Some(have) => Err(CalibrationError::Length { have, need }),
+            None => Ok(both),
+        }
+    }
 }
 
 /// Logistic regression on the features, their squares and their products in pairs.
@@ -42,20 +70,6 @@ pub struct Logistic {
 }
 
 impl Logistic {
-    /// The one in the program.
-    ///
-    /// # Errors
-    /// [`CalibrationError`] if the file in the program was damaged at build time.
-    pub fn embedded() -> Result<Self, CalibrationError> {
-        let model: Self =
-            serde_json::from_str(include_str!("calibration.json")).map_err(CalibrationError::Format)?;
-        let need = Features::default().expanded().len();
-        match [&model.mean, &model.deviation, &model.weights].map(Vec::len).into_iter().find(|n| *n != need) {
-            Some(have) => Err(CalibrationError::Length { have, need }),
-            None => Ok(model),
-        }
-    }
-
     /// The probability of being right; 0 where a feature is NaN.
     pub fn probability(&self, features: &Features) -> Probability {
         let z: f64 = features
@@ -151,7 +165,7 @@ mod tests {
 
     #[test]
     fn the_one_in_the_program_loads() {
-        let model = Logistic::embedded().unwrap();
+        let model = Calibration::embedded().unwrap().among_others;
         let good = Features {
             fitness: 1.0,
             overlap_target: 1.0,

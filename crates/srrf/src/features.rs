@@ -112,6 +112,12 @@ impl Features {
         }
     }
 
+    /// Those of the fit alone: as if no other pose had been looked for.
+    #[must_use]
+    pub fn alone(&self) -> Self {
+        Self { challenger: 0.0, rival_support: 0.0, share_of_poses: 1.0, ..*self }
+    }
+
     /// The numbers, in the order in which the calibration weighs them. Whether other starts agree is none of them,
     /// since an answer from a good first guess has one start, which is not moved; the share among poses is a bound of its own.
     fn values(&self) -> [f64; 15] {

@@ -57,7 +57,7 @@ mod warning;
 
 pub use align::align;
 pub use answer::{Answer, AnswerOrError, AnswerVersion, NoAnswer, RunKeys, answer_schema};
-pub use calibration::{CalibrationError, Logistic};
+pub use calibration::{Calibration, CalibrationError, Logistic};
 pub use coarse::CoarsePose;
 pub use error::{Error, NoPose};
 pub use event::{Event, Observed, Observer};

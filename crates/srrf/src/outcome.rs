@@ -50,8 +50,11 @@ pub struct Outcome {
     /// What the clouds of source and target are drawn from, where they are meshes.
     pub surfaces: [Option<DrawnSurface>; 2],
     /// Calibrated probability that the pose is within 5 degrees and a tenth of the target's radius
-    /// (root mean square) of the true one; see [`crate::Logistic`].
+    /// (root mean square) of the true one; see [`crate::Calibration`].
     pub probability: Probability,
+    /// The same as far as the fit of the pose alone tells: what other poses fit as well is left out. For those who can tell which of them is
+    /// right, by a third scan or by what a scanner saw.
+    pub probability_of_fit: Probability,
     /// Whether the probability is too small to rely on the pose.
     pub abstain: bool,
     /// The method.

@@ -8,7 +8,7 @@ use srrf_refine::Scatter;
 use crate::clock::StageClock;
 use crate::error::Error;
 use crate::event::Event;
-use crate::judge::{Judge, Judgement};
+use crate::judge::{Judge, Judgement, is_sure};
 use crate::network::LazyNetwork;
 use crate::options::{Method, Options};
 use crate::outcome::{Outcome, PointCounts};
@@ -126,7 +126,7 @@ impl Registrar {
             let judgement = self.judge.judge(&best.features);
             let corroborated = search.is_corroborated(&best);
             answer = Some((best, judgement));
-            let (probability, sure) = (judgement.probability, judgement.is_sure());
+            let (probability, sure) = (judgement.probability, is_sure(judgement.probability));
             request.observed.tell(Event::Judged { round: number, probability, sure });
             if sure || *round >= Round::Graph && probability.get() >= FAIR && corroborated {
                 break;
@@ -160,7 +160,7 @@ impl Registrar {
         let asked = |t: &StageTime| matches!(t.stage, Stage::Network | Stage::NetworkAllAround);
         let network = self.network.as_ref().filter(|_| learned.times.iter().any(asked));
         let weights = network.and_then(|network| Some(network.get().ok()?.weights.clone()));
-        let Judgement { probability, abstain } = judgement;
+        let Judgement { probability, abstain, alone } = judgement;
         learned.warnings.extend(abstain.then_some(Warning::Doubtful { probability }));
         let target_from_source = pair.frame.undo_pose(&best.pose);
         let answer = CandidatePose { target_from_source, probability };
@@ -173,6 +173,7 @@ impl Registrar {
             scale: None,
             surfaces: [None; 2],
             probability,
+            probability_of_fit: alone,
             abstain,
             method: self.options.method,
             start: best.start,

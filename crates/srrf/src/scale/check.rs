@@ -4,7 +4,7 @@ use srrf_cloud::PointCloud;
 
 use super::doubt::ScaleDoubt;
 use crate::error::Error;
-use crate::judge::Judgement;
+use crate::judge::is_sure;
 use crate::registrar::Registrar;
 use crate::request::Request;
 use crate::target::{PreparedPair, Target};
@@ -66,6 +66,6 @@ impl Registrar {
     fn is_sure(&self, request: &Request<'_>, source: &PointCloud, target: &Target) -> bool {
         let request = Request { source, observed: Default::default(), ..*request };
         self.first_round(&Request { target: target.into(), ..request })
-            .is_ok_and(|found| Judgement { probability: found.probability, abstain: found.abstain }.is_sure())
+            .is_ok_and(|found| is_sure(found.probability))
     }
 }

@@ -25,7 +25,7 @@ use std::sync::Mutex;
 use clap::Parser;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use srrf::{Features, Judge, Logistic, Options, Registrar, Request, ceiling};
+use srrf::{Calibration, Features, Judge, Logistic, Options, Registrar, Request, ceiling};
 use srrf_cloud::is_right;
 use srrf_corrupt::datasets::{Split, open};
 use srrf_corrupt::shapes::ProceduralShapes;
@@ -99,10 +99,16 @@ fn main() {
         if arguments.modelnet.is_some() { ", validation shapes of ModelNet40's training split" } else { "" },
         if arguments.scenes.is_empty() { "" } else { ", public scans and meshes" },
     );
-    let model = Logistic::fit(&of_fit, arguments.ridge, what).unwrap();
-    let says = |e: &Example| Judge::with(model.clone()).judge(&e.features).probability.get();
+    let alone: Vec<(Features, bool)> = of_fit.iter().map(|(f, right)| (f.alone(), *right)).collect();
+    let among_others = Logistic::fit(&of_fit, arguments.ridge, what.clone()).unwrap();
+    let alone = Logistic::fit(&alone, arguments.ridge, what).unwrap();
+    let model = Calibration { among_others, alone };
+    let judge = Judge::with(model.clone());
+    let says = |e: &Example| judge.judge(&e.features).probability.get();
     println!("the new fit, on what it was fitted on:\n{}", report::tables(&fitted, says));
     println!("the new fit, held out:\n{}", report::tables(&held_out, says));
+    let by_the_fit = |e: &Example| judge.judge(&e.features).alone.get();
+    println!("without other poses, held out:\n{}", report::tables(&held_out, by_the_fit));
     if arguments.write {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../crates/srrf/src/calibration.json");
         fs::write(&path, serde_json::to_string_pretty(&model).unwrap() + "\n").unwrap();
@@ -110,7 +116,7 @@ fn main() {
 }
 
 fn write_page(book: &Path, pairs: usize, page: &str) {
-    let fitted_on = Logistic::embedded().unwrap().fitted_on;
+    let fitted_on = Calibration::embedded().unwrap().among_others.fitted_on;
     let text = format!(
         "<!-- Written by `calibrate --measure --book`: what is changed here by hand is lost. -->\n\n# Reliability by kind\n\nThe regression was \
          fitted on {fitted_on}.\n\nBelow is what the program says of {pairs} others, of seed {} and other shapes.\n\n{page}",
