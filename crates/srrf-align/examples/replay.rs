@@ -32,6 +32,7 @@ struct Line {
     target_name: String,
     target_from_source: Option<[[f64; 4]; 4]>,
     probability: f64,
+    probability_of_fit: Option<f64>,
     abstain: bool,
 }
 
@@ -88,7 +89,9 @@ impl Scene {
                 let answer = PairAnswer {
                     target_from_source: line.target_from_source.map(|m| rigid(|r, c| m[r][c])),
                     probability: line.probability,
+                    probability_of_fit: line.probability_of_fit.unwrap_or(line.probability),
                     abstain: line.abstain,
+                    others: Vec::new(),
                 };
                 scene.pairs.insert((source, target), answer);
             }
@@ -177,7 +180,7 @@ impl Scans for Scene {
 /// Only those that a run asks for.
 impl PairStore for Scene {
     fn find(&self, source: usize, target: usize) -> Option<PairAnswer> {
-        self.pairs.get(&(source, target)).copied()
+        self.pairs.get(&(source, target)).cloned()
     }
 
     fn keep(&self, _: usize, _: usize, _: &PairAnswer) {}
@@ -196,7 +199,9 @@ impl RegisterPairs for Scene {
             return Ok(PairAnswer {
                 target_from_source: guess,
                 probability: GUESS_PROBABILITY,
+                probability_of_fit: GUESS_PROBABILITY,
                 abstain: false,
+                others: Vec::new(),
             });
         }
         self.missing.fetch_add(1, Ordering::Relaxed);

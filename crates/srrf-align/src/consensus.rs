@@ -79,10 +79,14 @@ pub struct Consensus {
 pub struct EdgeEvidence<'a> {
     /// Probability by the registration; 0 where nothing was measured.
     pub prior: &'a [f64],
+    /// The most that an edge has by itself, before sight: the probability by the registration among the other poses that fit as well.
+    pub by_itself: &'a [f64],
     /// What else speaks for it, in log odds.
     pub sight: &'a [f64],
     /// Whether the registration abstains.
     pub abstains: &'a [bool],
+    /// Whether other poses are as likely, so that loops close in wrong ways too.
+    pub tied: &'a [bool],
     /// Whether the user says that the scans overlap.
     pub vouched: &'a [bool],
     /// Whether the scans show the same whole, so that they may be two of a kind.
@@ -120,6 +124,12 @@ pub fn agree(nodes: usize, edges: &[GraphEdge], known: EdgeEvidence<'_>) -> Cons
             break;
         }
         lowered = next;
+    }
+    // Where no loop closes, the other poses that fit as well count.
+    for (e, confirmed) in confirmed(edges.len(), &posterior, &all).into_iter().enumerate() {
+        if !confirmed && !known.vouched[e] && !known.abstains[e] {
+            posterior[e] = posterior[e].min(of_logit(logit(known.by_itself[e]) + known.sight[e]));
+        }
     }
     let look_alike = lowered <= LOOK_ALIKE || known.doubled.contains(&true);
     let may_join = joining(edges, &posterior, known, &all, look_alike);
@@ -202,7 +212,7 @@ fn only_there(edges: &[GraphEdge], posterior: &[f64], known: EdgeEvidence<'_>) -
     edges.iter().map(|edge| !fits(&edge.source) && !fits(&edge.target)).collect()
 }
 
-/// Which edges may join scans. Where places look alike, a pair that no loop confirms joins only scans that fit nowhere else. One whose
+/// Which edges may join scans: none of which other poses are as likely, unless the user vouches for it. Where places look alike, a pair that no loop confirms joins only scans that fit nowhere else. One whose
 /// registration abstains does so only if scanners saw nothing against it as well, and other pairs say the same.
 fn joining(
     edges: &[GraphEdge],
@@ -217,7 +227,7 @@ fn joining(
         .into_iter()
         .enumerate()
         .map(|(e, confirmed)| match () {
-            () if known.doubled[e] => false,
+            () if known.doubled[e] || known.tied[e] && !known.vouched[e] => false,
             () if confirmed => posterior[e] >= HALF,
             () if known.abstains[e] => {
                 posterior[e] >= SURE && known.sight[e] > 0.0 && repeated[e] && alone[e]

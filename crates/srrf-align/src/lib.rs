@@ -43,4 +43,4 @@ pub use consensus::EdgeVerdict;
 pub use graph::{GraphEdge, Optimised, optimise};
 pub use map::{Map, MapEdge, OpenMotion, PairChoice, PlacedScan, WorstLoop};
 pub use options::{AlignError, AlignOptions, AlignProgress, AlignStage, PairReason};
-pub use pair::{NoStore, PairAnswer, PairStore, RegisterPairs, Scans};
+pub use pair::{NoStore, OtherPose, PairAnswer, PairStore, RegisterPairs, Scans};

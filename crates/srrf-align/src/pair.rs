@@ -77,21 +77,56 @@ pub trait RegisterPairs: Sync {
     }
 }
 
-/// The registration of a pair.
+/// Another pose of a pair that fits as well.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OtherPose {
+    /// The pose, in input coordinates.
+    pub target_from_source: Rigid,
+    /// Probability that it is the right one, in [0, 1].
+    pub probability: f64,
+}
+
+/// The registration of a pair.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PairAnswer {
     /// The pose, in input coordinates; none where no pose was found.
     pub target_from_source: Option<Rigid>,
-    /// Probability that it is right as far as its fit tells, in [0, 1]: what other poses fit as well, other scans tell better than the pair.
+    /// Probability that it is right, in [0, 1].
     pub probability: f64,
-    /// Whether that is too little.
+    /// The same as far as its fit tells, in [0, 1]: as if there were no other poses that fit as well, which what scanners saw may exclude.
+    /// The same as `probability` where that is not known.
+    pub probability_of_fit: f64,
+    /// Whether the probability is too little.
     pub abstain: bool,
+    /// The other poses that fit as well.
+    pub others: Vec<OtherPose>,
 }
 
 impl PairAnswer {
     /// No pose.
-    pub const NOTHING: Self = Self { target_from_source: None, probability: 0.0, abstain: true };
+    pub const NOTHING: Self = Self {
+        target_from_source: None,
+        probability: 0.0,
+        probability_of_fit: 0.0,
+        abstain: true,
+        others: Vec::new(),
+    };
+
+    /// The same with source and target exchanged.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let inverse = |other: &OtherPose| OtherPose {
+            target_from_source: other.target_from_source.inverse(),
+            ..*other
+        };
+        Self {
+            target_from_source: self.target_from_source.map(|pose| pose.inverse()),
+            others: self.others.iter().map(inverse).collect(),
+            ..*self
+        }
+    }
 }
 
 /// Pairs that are done, so that an alignment can go on where it stopped, and a scan be added later.

@@ -6,12 +6,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use srrf_cloud::Rigid;
 
+use crate::consensus::HALF;
 use crate::graph::GraphEdge;
 use crate::options::{AlignError, AlignProgress, AlignStage, PairReason};
 use crate::overlay::Overlay;
-use crate::pair::{PairAnswer, PairStore, RegisterPairs, Scans};
+use crate::pair::{OtherPose, PairAnswer, PairStore, RegisterPairs, Scans};
 use crate::se3::displacement;
 use crate::surface::ScanSurface;
+use crate::trust::Sight;
 
 /// Points that share less than this with the other scan are no overlap.
 const LEAST_OVERLAP: f64 = 0.02;
@@ -47,8 +49,10 @@ pub struct TriedPair {
     pub overlay: Option<Overlay>,
     /// The edge between the centred scans; without a pose it says nothing.
     pub edge: GraphEdge,
-    /// Probability by the registration; 0 where the points do not lie on each other.
+    /// Probability by the registration, without the other poses that scanners saw through; 0 where the points do not lie on each other.
     pub prior: f64,
+    /// Whether others are as likely, so that a loop of such pairs closes as well in a wrong way as in the right one.
+    pub tied: bool,
 }
 
 /// Pairs with their places in a list.
@@ -172,7 +176,7 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Workplace<'_, S, R> {
                 // The guess is of the first scan in the second's frame.
                 let guess = c.guess.map(|g| if source == c.scans.0 { g } else { g.inverse() });
                 let answer = match (kept, &ready) {
-                    (Some(answer), _) => *answer,
+                    (Some(answer), _) => answer.clone(),
                     (None, None) => PairAnswer::NOTHING,
                     (None, Some(ready)) => {
                         let scan = read(source)?;
@@ -195,12 +199,9 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Workplace<'_, S, R> {
 
     /// The answer of a pair in the store, in either order.
     fn kept(&self, source: usize, target: usize) -> Option<PairAnswer> {
-        self.store.find(source, target).or_else(|| {
-            self.store.find(target, source).map(|answer| PairAnswer {
-                target_from_source: answer.target_from_source.map(|pose| pose.inverse()),
-                ..answer
-            })
-        })
+        self.store
+            .find(source, target)
+            .or_else(|| self.store.find(target, source).map(|answer| answer.inverse()))
     }
 
     /// What is made of an answer. Where it is at the pose by which the walls of both lie on each other, the better of the two stands:
@@ -234,9 +235,37 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Workplace<'_, S, R> {
             target_from_source: centred.unwrap_or_else(Rigid::identity),
             information: overlay.as_ref().map_or_else(nalgebra::Matrix6::identity, |o| o.information),
         };
-        let prior = if lies { answer.probability } else { 0.0 };
-        TriedPair { source, target, reason, answer, overlay, edge, prior }
+        let (probability, tied) = among_others(&answer, overlay.as_ref(), |other| {
+            let there = fixed.centred(moving, other);
+            fixed.stands(moving, &there).then(|| fixed.seen_through(moving, &there, usize::MAX)).flatten()
+        });
+        let prior = if lies { probability } else { 0.0 };
+        TriedPair { source, target, reason, answer, overlay, edge, prior, tied }
     }
+}
+
+/// The probability of a pair among the other poses that fit as well, and whether those are as likely. Where scanners saw through what is there
+/// in another pose, or it does not stand, it counts so much less: `seen_through` is the share that they saw through; none where it does not
+/// stand.
+fn among_others(
+    answer: &PairAnswer,
+    overlay: Option<&Overlay>,
+    seen_through: impl Fn(&Rigid) -> Option<f64>,
+) -> (f64, bool) {
+    let fit = answer.probability_of_fit;
+    let Some(here) = overlay.and_then(|o| o.seen_through) else {
+        return (answer.probability, answer.abstain && fit >= HALF);
+    };
+    let sight = Sight::usual();
+    let left = |other: &OtherPose| {
+        let there = seen_through(&other.target_from_source)?;
+        Some(other.probability * (sight.log_ratio(there) - sight.log_ratio(here)).exp())
+    };
+    let others: f64 = answer.others.iter().filter_map(left).sum();
+    let share = if others > 0.0 { answer.probability / (answer.probability + others) } else { 1.0 };
+    // As a registration has it: of poses that fit as well the best one is right twice as often as its weight says.
+    let best = 2.0 * share / (1.0 + share);
+    (fit.min(best), share < HALF)
 }
 
 #[cfg(test)]

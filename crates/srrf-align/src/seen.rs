@@ -28,6 +28,8 @@ const SIGHT_ROUNDS: usize = 8;
 pub fn consensus_of(surfaces: &[ScanSurface], pool: &PairPool) -> Consensus {
     let edges: Vec<_> = pool.tried.iter().map(|t| t.edge.clone()).collect();
     let prior: Vec<f64> = pool.tried.iter().map(|t| t.prior).collect();
+    let by_itself: Vec<f64> = pool.tried.iter().map(|t| t.answer.probability).collect();
+    let tied: Vec<bool> = pool.tried.iter().map(|t| t.tied).collect();
     let abstains: Vec<bool> = pool.tried.iter().map(|t| t.answer.abstain).collect();
     let vouched: Vec<bool> =
         pool.tried.iter().map(|t| matches!(t.reason, PairReason::Sequence | PairReason::Guess)).collect();
@@ -55,6 +57,8 @@ pub fn consensus_of(surfaces: &[ScanSurface], pool: &PairPool) -> Consensus {
     loop {
         let known = EdgeEvidence {
             prior: &prior,
+            by_itself: &by_itself,
+            tied: &tied,
             sight: &by_sight,
             abstains: &abstains,
             vouched: &vouched,

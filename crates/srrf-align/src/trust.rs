@@ -40,6 +40,11 @@ pub struct Sight {
 }
 
 impl Sight {
+    /// As long as no pair is known.
+    pub fn usual() -> Self {
+        Self { usual: USUAL }
+    }
+
     /// What is usual, by expectation and maximisation from the pairs that are rather right. `prior` is that of the registrations.
     pub fn learned(prior: &[f64], share: &[Option<f64>]) -> Self {
         let mut sight = Self { usual: LEAST };

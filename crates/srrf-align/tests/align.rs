@@ -128,7 +128,13 @@ impl RegisterPairs for Oracle<'_> {
             (anywhere([1.5, 0.4 * s.sin(), 2.0], [0.0; 3]), 0.1)
         };
         let pose = about(&by).compose(&right);
-        Ok(PairAnswer { target_from_source: Some(pose), probability, abstain: probability < 0.5 })
+        Ok(PairAnswer {
+            target_from_source: Some(pose),
+            probability,
+            probability_of_fit: probability,
+            abstain: probability < 0.5,
+            others: Vec::new(),
+        })
     }
 }
 
@@ -192,7 +198,7 @@ struct ThrownIn(BTreeMap<(usize, usize), PairAnswer>);
 
 impl PairStore for ThrownIn {
     fn find(&self, source: usize, target: usize) -> Option<PairAnswer> {
-        self.0.get(&(source, target)).copied()
+        self.0.get(&(source, target)).cloned()
     }
 
     fn pairs(&self) -> Vec<(usize, usize)> {
@@ -219,7 +225,16 @@ fn a_turntable_comes_together_though_three_in_ten_pairs_are_sure_and_wrong() {
             let angles = std::array::from_fn(|_| rng.random_range(-3.0..3.0));
             let off = anywhere(angles, std::array::from_fn(|_| rng.random_range(-1.0..1.0)));
             let pose = Some(scene.relative(a, b).compose(&off));
-            wrong.insert((a, b), PairAnswer { target_from_source: pose, probability: 0.95, abstain: false });
+            wrong.insert(
+                (a, b),
+                PairAnswer {
+                    target_from_source: pose,
+                    probability: 0.95,
+                    probability_of_fit: 0.95,
+                    abstain: false,
+                    others: Vec::new(),
+                },
+            );
         }
     }
     let map = align(&scene.scans[..], &oracle, &AlignOptions::default(), &ThrownIn(wrong.clone()), &|_| {})
@@ -296,11 +311,11 @@ struct Kept(Mutex<BTreeMap<(usize, usize), PairAnswer>>);
 
 impl PairStore for Kept {
     fn find(&self, source: usize, target: usize) -> Option<PairAnswer> {
-        self.0.lock().unwrap().get(&(source, target)).copied()
+        self.0.lock().unwrap().get(&(source, target)).cloned()
     }
 
     fn keep(&self, source: usize, target: usize, answer: &PairAnswer) {
-        assert!(self.0.lock().unwrap().insert((source, target), *answer).is_none(), "asked twice");
+        assert!(self.0.lock().unwrap().insert((source, target), answer.clone()).is_none(), "asked twice");
     }
 }
 

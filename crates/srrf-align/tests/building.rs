@@ -114,7 +114,13 @@ impl RegisterPairs for Survey {
         _: Option<Rigid>,
     ) -> Result<PairAnswer, Infallible> {
         let source = self.prepare(source)?;
-        let sure = |pose| PairAnswer { target_from_source: Some(pose), probability: 0.96, abstain: false };
+        let sure = |pose| PairAnswer {
+            target_from_source: Some(pose),
+            probability: 0.96,
+            probability_of_fit: 0.96,
+            abstain: false,
+            others: Vec::new(),
+        };
         if self.overlap(source, *target, &Vector3::zeros()) > 0.3 {
             return Ok(sure(self.relative(source, *target)));
         }

@@ -2,11 +2,12 @@
 
 use std::convert::Infallible;
 
-use srrf_align::{AlignError, AlignOptions, Map, NoStore, PairAnswer, RegisterPairs};
+use srrf_align::{AlignError, AlignOptions, Map, NoStore, OtherPose, PairAnswer, RegisterPairs};
 use srrf_cloud::{PointCloud, Rigid};
 
 use crate::error::Error;
 use crate::options::{Method, Options};
+use crate::poses::CandidatePose;
 use crate::registrar::Registrar;
 use crate::request::Request;
 use crate::target::Target;
@@ -39,8 +40,7 @@ impl RegisterPairs for Registrar {
 }
 
 impl Registrar {
-    /// As [`register`](Self::register), in the words of an alignment: where no pose is found the answer is nothing, and the
-    /// probability is that of the fit alone, since which of the poses that fit as well is right is for the other scans to say.
+    /// As [`register`](Self::register), in the words of an alignment: where no pose is found the answer is nothing.
     ///
     /// # Errors
     /// As [`register`](Self::register), but for [`Error::NoPose`].
@@ -48,8 +48,10 @@ impl Registrar {
         match self.register(request) {
             Ok(found) => Ok(PairAnswer {
                 target_from_source: Some(found.target_from_source),
-                probability: found.probability_of_fit.get(),
-                abstain: found.probability_of_fit < self.options().abstain_below,
+                probability: found.probability.get(),
+                probability_of_fit: found.probability_of_fit.get(),
+                abstain: found.abstain,
+                others: found.poses.iter().skip(1).map(other_pose).collect(),
             }),
             Err(Error::NoPose(_)) => Ok(PairAnswer::NOTHING),
             Err(other) => Err(other),
@@ -63,6 +65,10 @@ impl Registrar {
     pub fn guided(&self) -> Result<Self, Error> {
         Self::new(Options { method: Method::Given, ..self.options().clone() })
     }
+}
+
+fn other_pose(pose: &CandidatePose) -> OtherPose {
+    OtherPose { target_from_source: pose.target_from_source, probability: pose.probability.get() }
 }
 
 /// Lays scans in one frame, with the default options; those that nothing joins are components of their own.

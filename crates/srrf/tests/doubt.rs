@@ -126,3 +126,18 @@ fn a_cube_has_twenty_four_poses_and_a_box_four() {
         }
     }
 }
+
+#[test]
+fn samplings_of_a_box_join_no_map_however_many_loops_close() {
+    for (sides, count) in [([1.0, 1.0, 1.0], 2), ([1.0, 1.5, 2.2], 4)] {
+        let scans: Vec<PointCloud> = (0..count)
+            .map(|i| {
+                let turn = turned([80.0 * i as f64, 50.0 * i as f64, -70.0 * i as f64]);
+                boxed(1000, 20 + i, sides).transformed(&turn)
+            })
+            .collect();
+        let map = srrf::align(&scans).unwrap();
+        let placed: Vec<_> = map.scans.iter().filter(|scan| !scan.abstain).collect();
+        assert!(placed.is_empty(), "{sides:?}: {placed:?}");
+    }
+}

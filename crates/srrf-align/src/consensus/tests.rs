@@ -14,9 +14,11 @@ fn agreed(nodes: usize, edges: &[GraphEdge], prior: &[f64], abstains: &[bool]) -
         edges,
         EdgeEvidence {
             prior,
+            by_itself: prior,
             sight: &sight,
             twins: &vec![false; edges.len()],
             doubled: &vec![false; edges.len()],
+            tied: &vec![false; edges.len()],
             abstains,
             vouched: &vouched,
             loops: &loops,
@@ -125,9 +127,11 @@ fn a_map_is_one_as_long_as_it_is_likelier_right_than_wrong() {
     let vouched = [true; 8];
     let known = EdgeEvidence {
         prior: &prior,
+        by_itself: &prior,
         sight: &sight,
         twins: &[false; 64],
         doubled: &[false; 64],
+        tied: &vec![false; edges.len()],
         abstains: &none,
         vouched: &vouched,
         loops: &[],
@@ -156,9 +160,11 @@ fn what_scanners_saw_breaks_a_map() {
     loops.extend(blocked);
     let known = EdgeEvidence {
         prior: &prior,
+        by_itself: &prior,
         sight: &[0.0; 7],
         twins: &[false; 7],
         doubled: &[false; 7],
+        tied: &vec![false; edges.len()],
         abstains: &[false; 7],
         vouched: &[false; 7],
         loops: &loops,
@@ -181,9 +187,11 @@ fn edges_that_abstain_join_where_all_was_seen_and_they_say_the_same() {
         loops.iter_mut().for_each(|l| l.implied = l.edges.contains(&3));
         let known = EdgeEvidence {
             prior: &prior,
+            by_itself: &prior,
             sight: &sight,
             twins: &[false; 6],
             doubled: &[false; 6],
+            tied: &vec![false; edges.len()],
             abstains: &[false, false, false, true, true, true],
             vouched: &[false; 6],
             loops: &loops,
@@ -202,4 +210,52 @@ fn nothing_measured_is_no_edge() {
     let truth = ring(2);
     let found = agreed(2, &[exact(&truth, 0, 1)], &[0.0], &[true]);
     assert_eq!((found.components.len(), found.verdicts[0]), (2, EdgeVerdict::Nothing));
+}
+
+#[test]
+fn other_poses_that_fit_as_well_count_where_no_loop_closes() {
+    let poses = ring(3);
+    let edges = [exact(&poses, 0, 1), exact(&poses, 1, 2), exact(&poses, 2, 0)];
+    let prior = [0.97; 3];
+    let joined = |edges: &[GraphEdge], by_itself: f64| {
+        let n = edges.len();
+        let loops = triangles(3, edges, &prior[..n]);
+        let known = EdgeEvidence {
+            prior: &prior[..n],
+            by_itself: &[by_itself; 3][..n],
+            sight: &[0.0; 3][..n],
+            abstains: &[false; 3][..n],
+            vouched: &[false; 3][..n],
+            twins: &[false; 3][..n],
+            doubled: &[false; 3][..n],
+            tied: &vec![false; edges.len()],
+            loops: &loops,
+            implied: &|_| false,
+        };
+        let found = agree(3, edges, known);
+        (found.components.len(), found.posterior[0])
+    };
+    assert_eq!(joined(&edges[..1], 0.97).0, 2);
+    let (alone, says) = joined(&edges[..1], 0.6);
+    assert!(alone == 3 && says <= 0.6 + 1e-9, "{alone} {says}");
+    let (together, says) = joined(&edges, 0.6);
+    assert!(together == 1 && says > 0.97, "{together} {says}");
+    // A box lies on itself in four ways: three scans of it close a loop in sixteen ways, one of which is right.
+    let all_tied = |vouched: bool| {
+        let loops = triangles(3, &edges, &prior);
+        let known = EdgeEvidence {
+            prior: &prior,
+            by_itself: &prior,
+            sight: &[0.0; 3],
+            abstains: &[true; 3],
+            vouched: &[vouched; 3],
+            twins: &[false; 3],
+            doubled: &[false; 3],
+            tied: &[true; 3],
+            loops: &loops,
+            implied: &|_| false,
+        };
+        agree(3, &edges, known).components.len()
+    };
+    assert_eq!((all_tied(false), all_tied(true)), (3, 1));
 }

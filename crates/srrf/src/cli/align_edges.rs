@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
-use srrf_align::{PairAnswer, PairStore};
+use srrf_align::{OtherPose, PairAnswer, PairStore};
 use srrf_args::{Failure, files, interrupt};
 
 use super::align_poses::{matrix, rigid_of};
@@ -25,9 +25,22 @@ struct EdgeLine {
     /// 4 rows of 4; null where no pose was found.
     target_from_source: Option<[[f64; 4]; 4]>,
     probability: f64,
+    /// Earlier versions wrote none.
+    #[serde(default)]
+    probability_of_fit: Option<f64>,
     abstain: bool,
+    /// The other poses that fit as well. Earlier versions wrote none.
+    #[serde(default)]
+    others: Vec<OtherLine>,
     /// What it was made with.
     options: String,
+}
+
+/// Another pose.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+struct OtherLine {
+    target_from_source: [[f64; 4]; 4],
+    probability: f64,
 }
 
 /// A file of edges that is being filled, or none.
@@ -99,7 +112,7 @@ impl<'a> EdgeFile<'a> {
 impl PairStore for EdgeFile<'_> {
     fn find(&self, source: usize, target: usize) -> Option<PairAnswer> {
         let key = (self.scans.hash(source).to_owned(), self.scans.hash(target).to_owned());
-        self.known.get(&key).copied()
+        self.known.get(&key).cloned()
     }
 
     fn pairs(&self) -> Vec<(usize, usize)> {
@@ -120,7 +133,9 @@ impl PairStore for EdgeFile<'_> {
             target_name: self.scans.name(target),
             target_from_source: answer.target_from_source.as_ref().map(matrix),
             probability: answer.probability,
+            probability_of_fit: Some(answer.probability_of_fit),
             abstain: answer.abstain,
+            others: answer.others.iter().map(OtherLine::of).collect(),
             options: self.options.clone(),
         };
         let _guard = interrupt::hold();
@@ -152,14 +167,35 @@ fn parse(text: &[u8], options: &str) -> Result<BTreeMap<(String, String), PairAn
             Some(rows) => Some(rigid_of(rows).map_err(problem)?),
             None => None,
         };
-        if !(0.0..=1.0).contains(&line.probability) {
-            return Err(problem(format!("a probability of {}; it must be from 0 to 1", line.probability)));
+        let probability_of_fit = line.probability_of_fit.unwrap_or(line.probability);
+        if let Some(p) = [line.probability, probability_of_fit].into_iter().find(|p| !(0.0..=1.0).contains(p))
+        {
+            return Err(problem(format!("a probability of {p}; it must be from 0 to 1")));
         }
-        let answer: PairAnswer =
-            PairAnswer { target_from_source: pose, probability: line.probability, abstain: line.abstain };
+        let answer = PairAnswer {
+            target_from_source: pose,
+            probability: line.probability,
+            probability_of_fit,
+            abstain: line.abstain,
+            others: line.others.iter().map(OtherLine::pose).collect::<Result<_, _>>().map_err(problem)?,
+        };
         known.insert((line.source, line.target), answer);
     }
     Ok(known)
+}
+
+impl OtherLine {
+    fn of(other: &OtherPose) -> Self {
+        Self { target_from_source: matrix(&other.target_from_source), probability: other.probability }
+    }
+
+    fn pose(&self) -> Result<OtherPose, String> {
+        let p = self.probability;
+        if !(0.0..=1.0).contains(&p) {
+            return Err(format!("a probability of {p}; it must be from 0 to 1"));
+        }
+        Ok(OtherPose { target_from_source: rigid_of(&self.target_from_source)?, probability: p })
+    }
 }
 
 #[cfg(test)]
@@ -171,7 +207,9 @@ fn line_of(source: &str, target: &str, pose: &srrf_cloud::Rigid, options: &str) 
         target_name: "b".into(),
         target_from_source: Some(matrix(pose)),
         probability: 0.9,
+        probability_of_fit: Some(0.95),
         abstain: false,
+        others: vec![OtherLine { target_from_source: matrix(pose), probability: 0.05 }],
         options: options.into(),
     };
     format!("{}\n", serde_json::to_string(&line).unwrap())
@@ -189,8 +227,17 @@ mod tests {
         pose.translation.x = 0.1 + 0.2;
         let text = line_of("aa", "bb", &pose, "o") + &line_of("bb", "cc", &pose, "o");
         let known = parse(text.as_bytes(), "o").unwrap();
-        let first = known[&("aa".to_owned(), "bb".to_owned())];
+        let first = &known[&("aa".to_owned(), "bb".to_owned())];
         assert_eq!((known.len(), first.target_from_source, first.probability), (2, Some(pose), 0.9));
+        assert_eq!((first.probability_of_fit, first.others.len()), (0.95, 1));
+        assert_eq!(first.others[0], OtherPose { target_from_source: pose, probability: 0.05 });
+        // As versions wrote them that knew no other poses.
+        let mut old: serde_json::Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
+        let fields = old.as_object_mut().unwrap();
+        assert!(fields.remove("others").is_some() && fields.remove("probability_of_fit").is_some());
+        let known = parse(old.to_string().as_bytes(), "o").unwrap();
+        let first = &known[&("aa".to_owned(), "bb".to_owned())];
+        assert_eq!((first.probability_of_fit, first.others.len()), (0.9, 0));
         let error = |text: &str| parse(text.as_bytes(), "o").unwrap_err();
         assert_eq!(error(&(text.clone() + "hello\n")).0, 3);
         assert!(error(&line_of("aa", "bb", &pose, "p")).1.contains("other options"));
