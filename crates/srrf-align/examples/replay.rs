@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
-use srrf_align::{AlignOptions, Map, PairAnswer, PairStore, RegisterPairs, Scans, align};
+use srrf_align::{AlignOptions, Map, OtherPose, PairAnswer, PairStore, RegisterPairs, Scans, align};
 use srrf_cloud::io::CloudFile;
 use srrf_cloud::{KnnIndex, PointCloud, Rigid, estimate_normals, spacing_of};
 
@@ -34,6 +34,15 @@ struct Line {
     probability: f64,
     probability_of_fit: Option<f64>,
     abstain: bool,
+    #[serde(default)]
+    others: Vec<OtherLine>,
+}
+
+/// Another pose of a pair.
+#[derive(Deserialize)]
+struct OtherLine {
+    target_from_source: [[f64; 4]; 4],
+    probability: f64,
 }
 
 /// Scans with the truth and their pairs.
@@ -86,12 +95,16 @@ impl Scene {
                 numbers.get(name).copied()
             };
             if let (Some(source), Some(target)) = (number(&line.source_name), number(&line.target_name)) {
+                let other = |o: &OtherLine| OtherPose {
+                    target_from_source: rigid(|r, c| o.target_from_source[r][c]),
+                    probability: o.probability,
+                };
                 let answer = PairAnswer {
                     target_from_source: line.target_from_source.map(|m| rigid(|r, c| m[r][c])),
                     probability: line.probability,
                     probability_of_fit: line.probability_of_fit.unwrap_or(line.probability),
                     abstain: line.abstain,
-                    others: Vec::new(),
+                    others: line.others.iter().map(other).collect(),
                 };
                 scene.pairs.insert((source, target), answer);
             }

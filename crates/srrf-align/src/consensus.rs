@@ -126,13 +126,14 @@ pub fn agree(nodes: usize, edges: &[GraphEdge], known: EdgeEvidence<'_>) -> Cons
         lowered = next;
     }
     // Where no loop closes, the other poses that fit as well count.
-    for (e, confirmed) in confirmed(edges.len(), &posterior, &all).into_iter().enumerate() {
-        if !confirmed && !known.vouched[e] && !known.abstains[e] {
+    let confirmed = confirmed(edges.len(), &posterior, &all);
+    for e in 0..edges.len() {
+        if !confirmed[e] && !known.vouched[e] && !known.abstains[e] {
             posterior[e] = posterior[e].min(of_logit(logit(known.by_itself[e]) + known.sight[e]));
         }
     }
     let look_alike = lowered <= LOOK_ALIKE || known.doubled.contains(&true);
-    let may_join = joining(edges, &posterior, known, &all, look_alike);
+    let may_join = joining(edges, &posterior, known, &confirmed, &all, look_alike);
     let joins = likelier_right_than_wrong(nodes, edges, &posterior, may_join, known.vouched);
     let likely: Vec<f64> = posterior.iter().zip(&joins).map(|(p, j)| if *j { *p } else { 0.0 }).collect();
     let mut poses = along_tree(nodes, edges, &likely);
@@ -212,23 +213,23 @@ fn only_there(edges: &[GraphEdge], posterior: &[f64], known: EdgeEvidence<'_>) -
     edges.iter().map(|edge| !fits(&edge.source) && !fits(&edge.target)).collect()
 }
 
-/// Which edges may join scans: none of which other poses are as likely, unless the user vouches for it. Where places look alike, a pair that no loop confirms joins only scans that fit nowhere else. One whose
-/// registration abstains does so only if scanners saw nothing against it as well, and other pairs say the same.
+/// Which edges may join scans: none of which other poses are as likely, unless the user vouches for it. Where places look alike, a pair
+/// that no loop confirms joins only scans that fit nowhere else. One whose registration abstains does so only if scanners saw nothing
+/// against it as well, and other pairs say the same.
 fn joining(
     edges: &[GraphEdge],
     posterior: &[f64],
     known: EdgeEvidence<'_>,
+    confirmed: &[bool],
     loops: &[EdgeLoop],
     look_alike: bool,
 ) -> Vec<bool> {
     let alone = only_there(edges, posterior, known);
     let repeated = repeated(posterior.len(), posterior, loops);
-    confirmed(posterior.len(), posterior, loops)
-        .into_iter()
-        .enumerate()
-        .map(|(e, confirmed)| match () {
+    (0..posterior.len())
+        .map(|e| match () {
             () if known.doubled[e] || known.tied[e] && !known.vouched[e] => false,
-            () if confirmed => posterior[e] >= HALF,
+            () if confirmed[e] => posterior[e] >= HALF,
             () if known.abstains[e] => {
                 posterior[e] >= SURE && known.sight[e] > 0.0 && repeated[e] && alone[e]
             }

@@ -235,11 +235,12 @@ impl<S: Scans + ?Sized, R: RegisterPairs> Workplace<'_, S, R> {
             target_from_source: centred.unwrap_or_else(Rigid::identity),
             information: overlay.as_ref().map_or_else(nalgebra::Matrix6::identity, |o| o.information),
         };
-        let (probability, tied) = among_others(&answer, overlay.as_ref(), |other| {
+        let seen_through = |other: &Rigid| {
             let there = fixed.centred(moving, other);
             fixed.stands(moving, &there).then(|| fixed.seen_through(moving, &there, usize::MAX)).flatten()
-        });
-        let prior = if lies { probability } else { 0.0 };
+        };
+        let (prior, tied) =
+            if lies { among_others(&answer, overlay.as_ref(), seen_through) } else { (0.0, false) };
         TriedPair { source, target, reason, answer, overlay, edge, prior, tied }
     }
 }

@@ -1,12 +1,10 @@
 //! Where else the clouds may fit: turns of a pose, by any rotation, that leave the source near the target.
 
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 use srrf_cloud::Rigid;
 
-use crate::orientations::orientations;
+use crate::orientations::{best_apart, orientations};
 use crate::probe::Probe;
-use crate::symmetry::angle;
 
 /// Rotations all around: one within about 12 degrees of any.
 const ROTATIONS: usize = 1500;
@@ -38,26 +36,11 @@ pub(crate) fn elsewhere(probe: &Probe<'_>, pose: &Rigid, centre: &Vector3<f64>, 
         };
         from_centre.iter().map(near).sum()
     };
-    let least = LEAST * score(&Matrix3::identity());
-    let all: Vec<Matrix3<f64>> = orientations(ROTATIONS).collect();
-    let mut scored: Vec<(f64, Matrix3<f64>)> = all
-        .into_par_iter()
-        .map(|rotation| (score(&rotation), rotation))
-        .filter(|(s, _)| *s >= least)
-        .collect();
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut kept: Vec<Matrix3<f64>> = Vec::new();
-    for (_, rotation) in scored {
-        let near = |other: &Matrix3<f64>| angle(&(other.transpose() * rotation)) < APART;
-        if kept.len() < MOST && !near(&Matrix3::identity()) && !kept.iter().any(near) {
-            kept.push(rotation);
-        }
-    }
     let turned = |rotation: Matrix3<f64>| Rigid {
         rotation: rotation * pose.rotation,
         translation: rotation * (pose.translation - centre) + centre,
     };
-    kept.into_iter().map(turned).collect()
+    best_apart(orientations(ROTATIONS).collect(), score, LEAST, APART, MOST).into_iter().map(turned).collect()
 }
 
 #[cfg(test)]

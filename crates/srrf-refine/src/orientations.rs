@@ -1,6 +1,7 @@
 //! Rotations spread evenly over all of SO(3), the same at every call.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion};
+use rayon::prelude::*;
 
 /// `n` rotations, evenly spread: super-Fibonacci spirals (Alexa, CVPR 2022).
 pub(crate) fn orientations(n: usize) -> impl Iterator<Item = Matrix3<f64>> {
@@ -14,6 +15,37 @@ pub(crate) fn orientations(n: usize) -> impl Iterator<Item = Matrix3<f64>> {
         let q = Quaternion::new(far * beta.cos(), near * alpha.sin(), near * alpha.cos(), far * beta.sin());
         *UnitQuaternion::from_quaternion(q).to_rotation_matrix().matrix()
     })
+}
+
+/// Of the rotations `tried` those with the highest scores, at most `most`, best first: each scores at least the share `least` of what the
+/// identity does, and is `apart` (radians) or more from the others and from the identity.
+pub(crate) fn best_apart(
+    tried: Vec<Matrix3<f64>>,
+    score: impl Fn(&Matrix3<f64>) -> f64 + Sync,
+    least: f64,
+    apart: f64,
+    most: usize,
+) -> Vec<Matrix3<f64>> {
+    let least = least * score(&Matrix3::identity());
+    let mut scored: Vec<(f64, Matrix3<f64>)> = tried
+        .into_par_iter()
+        .map(|rotation| (score(&rotation), rotation))
+        .filter(|(score, _)| *score >= least)
+        .collect();
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut kept: Vec<Matrix3<f64>> = Vec::new();
+    for (_, rotation) in scored {
+        let near = |other: &Matrix3<f64>| angle(&(other.transpose() * rotation)) < apart;
+        if kept.len() < most && !near(&Matrix3::identity()) && !kept.iter().any(near) {
+            kept.push(rotation);
+        }
+    }
+    kept
+}
+
+/// Angle of a rotation, radians.
+pub(crate) fn angle(rotation: &Matrix3<f64>) -> f64 {
+    ((rotation.trace() - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
 }
 
 #[cfg(test)]

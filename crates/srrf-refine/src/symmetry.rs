@@ -3,9 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
-use rayon::prelude::*;
 
-use crate::orientations::orientations;
+use crate::orientations::{best_apart, orientations};
 use crate::prepared::CloudLevel;
 
 /// Principal moments within this share of each other count as equal: a body with a symmetry beyond half-turns has equal ones.
@@ -57,26 +56,7 @@ pub(crate) fn symmetries(level: &CloudLevel, radius: f64) -> Vec<Matrix3<f64>> {
             }
         };
     let body = Body { level, width: WIDTH * radius };
-    let least = LEAST * body.score(&Matrix3::identity());
-    let mut scored: Vec<(f64, Matrix3<f64>)> = tried
-        .into_par_iter()
-        .map(|rotation| (body.score(&rotation), rotation))
-        .filter(|(score, _)| *score >= least)
-        .collect();
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut kept: Vec<Matrix3<f64>> = Vec::new();
-    for (_, rotation) in scored {
-        let near = |other: &Matrix3<f64>| angle(&(other.transpose() * rotation)) < apart;
-        if kept.len() < MOST && !near(&Matrix3::identity()) && !kept.iter().any(near) {
-            kept.push(rotation);
-        }
-    }
-    kept
-}
-
-/// Angle of a rotation, radians.
-pub(crate) fn angle(rotation: &Matrix3<f64>) -> f64 {
-    ((rotation.trace() - 1.0) / 2.0).clamp(-1.0, 1.0).acos()
+    best_apart(tried, |rotation| body.score(rotation), LEAST, apart, MOST)
 }
 
 struct Body<'a> {
@@ -107,6 +87,7 @@ mod tests {
     use srrf_cloud::PointCloud;
 
     use super::*;
+    use crate::orientations::angle;
     use crate::prepared::RefineCloud;
 
     /// Points on the surface of a box.

@@ -5,26 +5,27 @@ use crate::loops::tests::{exact, ring};
 use crate::loops::triangles;
 use crate::se3::{displacement, exp};
 
+/// Registrations of which nothing else is known.
+fn plain(prior: &[f64]) -> EdgeEvidence<'_> {
+    const MOST: usize = 128;
+    let (still, no) = (&[0.0; MOST][..prior.len()], &[false; MOST][..prior.len()]);
+    EdgeEvidence {
+        prior,
+        by_itself: prior,
+        sight: still,
+        abstains: no,
+        tied: no,
+        vouched: no,
+        twins: no,
+        doubled: no,
+        loops: &[],
+        implied: &|_| false,
+    }
+}
+
 fn agreed(nodes: usize, edges: &[GraphEdge], prior: &[f64], abstains: &[bool]) -> Consensus {
-    let n = edges.len();
-    let (sight, vouched) = (vec![0.0; n], vec![false; n]);
     let loops = triangles(nodes, edges, prior);
-    agree(
-        nodes,
-        edges,
-        EdgeEvidence {
-            prior,
-            by_itself: prior,
-            sight: &sight,
-            twins: &vec![false; edges.len()],
-            doubled: &vec![false; edges.len()],
-            tied: &vec![false; edges.len()],
-            abstains,
-            vouched: &vouched,
-            loops: &loops,
-            implied: &|_| false,
-        },
-    )
+    agree(nodes, edges, EdgeEvidence { abstains, loops: &loops, ..plain(prior) })
 }
 
 fn off(poses: &[Rigid], truth: &[Rigid]) -> f64 {
@@ -125,18 +126,8 @@ fn a_map_is_one_as_long_as_it_is_likelier_right_than_wrong() {
     assert_eq!(found.verdicts[0], EdgeVerdict::Unconfirmed);
     let (sight, none) = ([0.0; 8], [false; 8]);
     let vouched = [true; 8];
-    let known = EdgeEvidence {
-        prior: &prior,
-        by_itself: &prior,
-        sight: &sight,
-        twins: &[false; 64],
-        doubled: &[false; 64],
-        tied: &vec![false; edges.len()],
-        abstains: &none,
-        vouched: &vouched,
-        loops: &[],
-        implied: &|_| false,
-    };
+    let known =
+        EdgeEvidence { sight: &sight, abstains: &none, vouched: &vouched, loops: &[], ..plain(&prior) };
     assert_eq!(agree(9, &edges, known).components.len(), 1);
     // Of two scans that cannot be told apart, none is joined.
     let doubled: Vec<bool> = (0..64).map(|e| e == 3 || e == 4).collect();
@@ -158,18 +149,7 @@ fn what_scanners_saw_breaks_a_map() {
         .to_vec();
     let mut loops = triangles(6, &edges, &prior);
     loops.extend(blocked);
-    let known = EdgeEvidence {
-        prior: &prior,
-        by_itself: &prior,
-        sight: &[0.0; 7],
-        twins: &[false; 7],
-        doubled: &[false; 7],
-        tied: &vec![false; edges.len()],
-        abstains: &[false; 7],
-        vouched: &[false; 7],
-        loops: &loops,
-        implied: &|_| false,
-    };
+    let known = EdgeEvidence { loops: &loops, ..plain(&prior) };
     let found = agree(6, &edges, known);
     assert_eq!(found.components, [vec![0, 1, 2], vec![3, 4, 5]], "{found:?}");
 }
@@ -186,16 +166,11 @@ fn edges_that_abstain_join_where_all_was_seen_and_they_say_the_same() {
         let mut loops = triangles(5, &edges, &prior);
         loops.iter_mut().for_each(|l| l.implied = l.edges.contains(&3));
         let known = EdgeEvidence {
-            prior: &prior,
-            by_itself: &prior,
             sight: &sight,
-            twins: &[false; 6],
-            doubled: &[false; 6],
-            tied: &vec![false; edges.len()],
             abstains: &[false, false, false, true, true, true],
-            vouched: &[false; 6],
             loops: &loops,
             implied: &|l| l.edges.contains(&3),
+            ..plain(&prior)
         };
         agree(5, &edges, known).components[0].clone()
     };
@@ -220,18 +195,7 @@ fn other_poses_that_fit_as_well_count_where_no_loop_closes() {
     let joined = |edges: &[GraphEdge], by_itself: f64| {
         let n = edges.len();
         let loops = triangles(3, edges, &prior[..n]);
-        let known = EdgeEvidence {
-            prior: &prior[..n],
-            by_itself: &[by_itself; 3][..n],
-            sight: &[0.0; 3][..n],
-            abstains: &[false; 3][..n],
-            vouched: &[false; 3][..n],
-            twins: &[false; 3][..n],
-            doubled: &[false; 3][..n],
-            tied: &vec![false; edges.len()],
-            loops: &loops,
-            implied: &|_| false,
-        };
+        let known = EdgeEvidence { by_itself: &[by_itself; 3][..n], loops: &loops, ..plain(&prior[..n]) };
         let found = agree(3, edges, known);
         (found.components.len(), found.posterior[0])
     };
@@ -244,16 +208,11 @@ fn other_poses_that_fit_as_well_count_where_no_loop_closes() {
     let all_tied = |vouched: bool| {
         let loops = triangles(3, &edges, &prior);
         let known = EdgeEvidence {
-            prior: &prior,
-            by_itself: &prior,
-            sight: &[0.0; 3],
             abstains: &[true; 3],
             vouched: &[vouched; 3],
-            twins: &[false; 3],
-            doubled: &[false; 3],
             tied: &[true; 3],
             loops: &loops,
-            implied: &|_| false,
+            ..plain(&prior)
         };
         agree(3, &edges, known).components.len()
     };
