@@ -43,7 +43,7 @@ ENDINGS = {".stl", ".obj", ".ply", ".off"}
 
 
 def meshes(folder, wheels, count):
-    """`count` meshes with some depth, no two of the same proportions, spread over the folder."""
+    """`count` meshes (all where none is said) with some depth, no two of the same proportions, spread over the folder."""
     if not folder.exists() or not any(p.suffix.lower() in ENDINGS for p in folder.rglob("*")):
         folder.mkdir(parents=True, exist_ok=True)
         command = [sys.executable, "-m", "pip", "download", "--no-deps", "--quiet", "--dest", folder, *wheels]
@@ -65,6 +65,7 @@ def meshes(folder, wheels, count):
             continue
         seen.add(key)
         found.append(mesh)
+    count = len(found) if count is None else count
     if len(found) < count:
         sys.exit(f"{folder} holds {len(found)} meshes that can be used, and --meshes asks for {count}")
     return [found[i] for i in np.linspace(0, len(found) - 1, count).astype(int)]

@@ -8,6 +8,8 @@
 //!
 //! [`GraphConsensus`] and [`RansacConsensus`] find poses in any [`Correspondences`], whatever made them.
 //!
+//! [`PpfModel`] finds a part in a scene by the features of its pairs of points.
+//!
 //! Their parts, [`fpfh`](mod@fpfh) and [`nearest_descriptors`], serve other methods as well.
 
 mod compatibility;
@@ -25,6 +27,7 @@ mod icp_robust;
 mod icp_trimmed;
 mod identity;
 mod memo;
+mod ppf;
 mod ransac;
 mod synthetic;
 
@@ -39,5 +42,6 @@ pub use icp_plane::{IcpPlane, IcpPlaneConfig};
 pub use icp_robust::{IcpRobust, IcpRobustConfig};
 pub use icp_trimmed::{IcpTrimmed, IcpTrimmedConfig};
 pub use identity::Identity;
+pub use ppf::{PpfConfig, PpfModel, VotedPose};
 pub use ransac::RansacConsensus;
 pub use synthetic::synthetic;

@@ -32,7 +32,7 @@ pub use fps::farthest_point_sampling;
 pub use frame::PairFrame;
 pub use mesh::{FEWEST_SCANNED, LEAST_SAMPLES, MOST_SAMPLES, MeshError, TriangleMesh};
 pub use neighbours::KnnIndex;
-pub use normals::estimate_normals;
+pub use normals::{estimate_normals, least_direction};
 pub use register::{
     Branch, BranchKind, Certainty, Register, RegisterError, Registration, Skeleton, Skeletons, SoftMatch,
 };

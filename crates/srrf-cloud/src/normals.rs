@@ -50,8 +50,8 @@ fn mean_of<'a>(points: impl ExactSizeIterator<Item = &'a [f64; 3]>) -> Vector3<f
     points.map(|p| Vector3::from(*p)).sum::<Vector3<f64>>() / count
 }
 
-/// Unit eigenvector of the smallest eigenvalue of the covariance.
-fn least_direction<'a>(points: impl ExactSizeIterator<Item = &'a [f64; 3]> + Clone) -> Vector3<f64> {
+/// The direction in which these points vary least, a unit vector whose sign says nothing.
+pub fn least_direction<'a>(points: impl ExactSizeIterator<Item = &'a [f64; 3]> + Clone) -> Vector3<f64> {
     let mean = mean_of(points.clone());
     let scatter = points.fold(Matrix3::zeros(), |sum, p| {
         let d = Vector3::from(*p) - mean;

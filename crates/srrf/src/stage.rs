@@ -23,6 +23,10 @@ pub enum Stage {
     FpfhGraphFiner,
     /// Ranking and refining after the graph.
     RefineGraph,
+    /// The votes of pairs of points.
+    PointPairs,
+    /// Ranking and refining after those.
+    RefinePointPairs,
     /// Iterative closest point.
     Icp,
     /// Ranking the starts and refining the best, the first time.
@@ -54,6 +58,8 @@ impl fmt::Display for Stage {
             Self::FpfhGraph => "fpfh-graph",
             Self::FpfhGraphFiner => "fpfh-graph, finer",
             Self::RefineGraph => "refine, graph",
+            Self::PointPairs => "point-pairs",
+            Self::RefinePointPairs => "refine, point pairs",
             Self::Icp => "icp",
             Self::Refine => "refine",
             Self::RefineGlobal => "refine, global",

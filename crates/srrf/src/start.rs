@@ -26,6 +26,8 @@ pub enum Start {
         /// Radius of the features, in voxels.
         feature_voxels: f64,
     },
+    /// The votes of pairs of points.
+    PointPairs,
     /// Iterative closest point from the first guess.
     Icp,
     /// The first guess itself.
@@ -42,7 +44,7 @@ impl Start {
             Self::FpfhRansac { .. } | Self::FpfhGraph { .. } => Method::FpfhRansac,
             Self::Icp => Method::Icp,
             Self::Given => Method::Given,
-            Self::Own(_) => Method::Auto,
+            Self::PointPairs | Self::Own(_) => Method::Auto,
         }
     }
 }
@@ -55,6 +57,7 @@ impl fmt::Display for Start {
             Self::Orientation(number) => write!(f, "network, orientation {number}"),
             Self::FpfhRansac { .. } => f.write_str("fpfh-ransac"),
             Self::FpfhGraph { .. } => f.write_str("fpfh-graph"),
+            Self::PointPairs => f.write_str("point-pairs"),
             Self::Icp => f.write_str("icp"),
             Self::Given => f.write_str("given"),
             Self::Own(name) => f.write_str(name),
@@ -81,6 +84,7 @@ mod tests {
             (Start::Orientation(7), "network, orientation 7"),
             (Start::FpfhRansac { feature_voxels: 8.0 }, "fpfh-ransac"),
             (Start::FpfhGraph { feature_voxels: 5.0 }, "fpfh-graph"),
+            (Start::PointPairs, "point-pairs"),
             (Start::Icp, "icp"),
             (Start::Given, "given"),
             (Start::Own("compass"), "compass"),

@@ -192,7 +192,7 @@ impl Global {
 }
 
 /// The poses that are turned by at most [`WITHIN_DEG`] against the first guess.
-fn within(poses: Vec<Rigid>, given: &Rigid) -> Result<Vec<Rigid>, RegisterError> {
+pub(super) fn within(poses: Vec<Rigid>, given: &Rigid) -> Result<Vec<Rigid>, RegisterError> {
     let count = poses.len();
     let kept: Vec<Rigid> = poses.into_iter().filter(|p| p.angle_to_deg(given) <= WITHIN_DEG).collect();
     if kept.is_empty() {

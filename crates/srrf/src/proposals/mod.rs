@@ -7,6 +7,7 @@ mod given;
 mod global;
 mod icp;
 mod network;
+mod parts;
 
 use std::fmt;
 use std::sync::Arc;
@@ -30,6 +31,7 @@ const SOURCES: &[Make] = &[
     given::first_guess,
     network::from_first_guess,
     global::graph,
+    parts::point_pairs,
     global::wide,
     global::fine,
     network::all_around,
@@ -64,6 +66,8 @@ pub(crate) enum Round {
     Cheap,
     /// The compatibility graph of matches.
     Graph,
+    /// The votes of pairs of points.
+    PointPairs,
     /// The network from the first guess.
     Network,
     /// Less likely poses, and wider features.
@@ -73,8 +77,15 @@ pub(crate) enum Round {
 }
 
 impl Round {
-    const ALL: [Self; 6] =
-        [Self::Guided, Self::Cheap, Self::Graph, Self::Network, Self::Wide, Self::AllAround];
+    const ALL: [Self; 7] = [
+        Self::Guided,
+        Self::Cheap,
+        Self::Graph,
+        Self::PointPairs,
+        Self::Network,
+        Self::Wide,
+        Self::AllAround,
+    ];
 
     /// What the time of ranking and refining after this round is reported as, where it is not the first.
     pub fn refining(self) -> Stage {
@@ -82,6 +93,7 @@ impl Round {
             Self::Guided => Stage::Refine,
             Self::Cheap => Stage::RefineGlobal,
             Self::Graph => Stage::RefineGraph,
+            Self::PointPairs => Stage::RefinePointPairs,
             Self::Network => Stage::RefineNetwork,
             Self::Wide => Stage::RefineWider,
             Self::AllAround => Stage::RefineAgain,
@@ -153,10 +165,11 @@ mod tests {
         let (any, within) = (RotationRange::Any, RotationRange::Within45);
         let (graph, fine) = (vec![Some(Stage::FpfhGraph)], Some(Stage::FpfhGraphFiner));
         let around = [vec![fine], around].concat();
-        let auto = [guided, cheap, graph.clone(), later, wide.clone(), around.clone()];
+        let pairs = vec![Some(Stage::PointPairs)];
+        let auto = [guided, cheap, graph.clone(), pairs, later, wide.clone(), around.clone()];
         assert_eq!(stages(Method::Auto, any, Some(&network)), auto);
         let within = stages(Method::Auto, within, Some(&network));
-        assert_eq!((&within[..5], &within[5]), (&auto[..5], &vec![fine]));
+        assert_eq!((&within[..6], &within[6]), (&auto[..6], &vec![fine]));
         assert_eq!(
             stages(Method::Srrf, any, Some(&network)),
             [vec![Some(Stage::Network)], vec![Some(Stage::NetworkAllAround)]]
