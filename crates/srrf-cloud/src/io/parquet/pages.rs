@@ -1,5 +1,8 @@
 //! What the headers of pages ask for, before the `parquet` crate takes memory for it.
 
+use std::io::{self, Read};
+
+use flate2::read::MultiGzDecoder;
 use parquet::basic::Compression;
 
 use super::super::FormatError;
@@ -7,6 +10,11 @@ use super::thrift::{DEPTH, FALSE, I32, STRUCT, Thrift, damaged};
 
 /// Snappy's longest copy: 64 bytes for 3.
 const SNAPPY: u64 = 22;
+/// What a byte can unpack to at most, by the design of Deflate and of LZ4.
+const DEFLATE: u64 = 1032;
+const LZ4: u64 = 255;
+/// How a frame of LZ4 begins.
+const LZ4_FRAME: [u8; 4] = [0x04, 0x22, 0x4d, 0x18];
 /// A block of Zstandard is at most so many bytes, and takes 4 at least.
 const ZSTD_BLOCK: u64 = 128 << 10;
 /// How a frame of Zstandard begins.
@@ -21,12 +29,18 @@ pub(super) struct Unpacked {
     pub values: u64,
 }
 
-/// Looks at the headers of the pages of a column in `bytes[begin..end]`.
+/// Whether this program unpacks it.
+pub(super) fn is_known(packing: Compression) -> bool {
+    packing != Compression::LZO
+}
+
+/// Looks at the headers of the pages of a column in `bytes[begin..end]`. Pages of more than `most` bytes are not looked into.
 pub(super) fn pages(
     bytes: &[u8],
     begin: u64,
     end: u64,
     packing: Compression,
+    most: u64,
 ) -> Result<Unpacked, FormatError> {
     let place = |at: u64| usize::try_from(at).ok().filter(|&at| at <= bytes.len());
     let outside = || damaged(format!("a column up to byte {end}"));
@@ -45,10 +59,15 @@ pub(super) fn pages(
             .and_then(|packed| thrift.at.checked_add(packed))
             .ok_or_else(outside)?;
         let body = bytes.get(thrift.at..at).ok_or_else(outside)?;
-        let most = page.most(body, packing);
-        if unpacked > most {
+        let whole = page.most(body, packing);
+        if unpacked > whole {
             return Err(damaged(format!(
-                "the header of a page asks for {unpacked} bytes, and what it packs in {packed} is {most} at most"
+                "the header of a page asks for {unpacked} bytes, and what it packs in {packed} is {whole} at most"
+            )));
+        }
+        if unpacked <= most && page.is_larger(body, packing, unpacked) {
+            return Err(damaged(format!(
+                "a page unpacks to more than the {unpacked} bytes that its header says"
             )));
         }
         all.page = all.page.max(unpacked);
@@ -80,10 +99,33 @@ impl PageHeader {
             _ if self.plain || rest.is_empty() => size,
             Compression::UNCOMPRESSED => size,
             Compression::SNAPPY => size.saturating_mul(SNAPPY),
+            Compression::GZIP(_) => size.saturating_mul(DEFLATE),
+            Compression::LZ4 | Compression::LZ4_RAW => size.saturating_mul(LZ4),
             Compression::ZSTD(_) => zstd_size(rest).unwrap_or((size / 4 + 1).saturating_mul(ZSTD_BLOCK)),
-            // Not read by this program; the crate says so.
+            // Brotli has no such number.
             _ => u64::MAX,
         })
+    }
+
+    /// Whether `body` unpacks to more than `unpacked` bytes. The `parquet` crate unpacks to the end whatever the header
+    /// says, where the packing does not need to know it.
+    fn is_larger(self, body: &[u8], packing: Compression, unpacked: u64) -> bool {
+        let levels = usize::try_from(self.levels).unwrap_or(usize::MAX).min(body.len());
+        let (front, rest) = body.split_at(levels);
+        let most = unpacked.saturating_sub(front.len() as u64);
+        let larger = |reader: &mut dyn Read| {
+            io::copy(&mut reader.take(most.saturating_add(1)), &mut io::sink()).is_ok_and(|size| size > most)
+        };
+        match packing {
+            _ if self.plain => false,
+            Compression::GZIP(_) => larger(&mut MultiGzDecoder::new(rest)),
+            Compression::BROTLI(_) => larger(&mut brotli::Decompressor::new(rest, 4096)),
+            // Older programs wrote frames.
+            Compression::LZ4 if rest.starts_with(&LZ4_FRAME) => {
+                larger(&mut lz4_flex::frame::FrameDecoder::new(rest))
+            }
+            _ => false,
+        }
     }
 }
 
@@ -149,7 +191,7 @@ mod tests {
         }
         bytes.extend([0x2c, 0x15, 6, 0, 0]); // three values
         bytes.extend(body);
-        pages(&bytes, 0, bytes.len() as u64, packing).map_err(|e| e.to_string())
+        pages(&bytes, 0, bytes.len() as u64, packing, u64::MAX).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -176,6 +218,35 @@ mod tests {
     }
 
     #[test]
+    fn a_page_holds_no_more_than_it_says() {
+        use std::io::Write;
+
+        use flate2::write::GzEncoder;
+        use parquet::basic::{BrotliLevel, GzipLevel};
+
+        let plain = [7; 3000];
+        let mut gzip = GzEncoder::new(Vec::new(), flate2::Compression::default());
+        gzip.write_all(&plain).unwrap();
+        let mut brotli = brotli::CompressorWriter::new(Vec::new(), 4096, 5, 20);
+        brotli.write_all(&plain).unwrap();
+        let mut frame = lz4_flex::frame::FrameEncoder::new(Vec::new());
+        frame.write_all(&plain).unwrap();
+        for (body, packing) in [
+            (gzip.finish().unwrap(), Compression::GZIP(GzipLevel::default())),
+            (brotli.into_inner(), Compression::BROTLI(BrotliLevel::default())),
+            (frame.finish().unwrap(), Compression::LZ4),
+        ] {
+            assert_eq!(of(3000, &body, packing), Ok(Unpacked { page: 3000, values: 3 }), "{packing}");
+            let error = of(2999, &body, packing).unwrap_err();
+            assert!(error.contains("more than the 2999 bytes"), "{packing}: {error}");
+        }
+        let error = of(1033, &[0], Compression::GZIP(GzipLevel::default())).unwrap_err();
+        assert!(error.contains("1032 at most"), "{error}");
+        let error = of(256, &[0], Compression::LZ4_RAW).unwrap_err();
+        assert!(error.contains("255 at most"), "{error}");
+    }
+
+    #[test]
     fn levels_are_not_packed() {
         // Version 2: 3 values, levels of 4 and 6 bytes, and all of it unpacked or not.
         let page = |unpacked: u32, plain: bool| {
@@ -183,7 +254,7 @@ mod tests {
             bytes.extend(int(unpacked));
             bytes.extend([0x15, 40, 0x5c, 0x15, 6, 0x45, 8, 0x15, 12, if plain { 0x12 } else { 0x11 }, 0, 0]);
             bytes.extend([0; 20]);
-            pages(&bytes, 0, bytes.len() as u64, Compression::SNAPPY).map(|all| all.page).ok()
+            pages(&bytes, 0, bytes.len() as u64, Compression::SNAPPY, u64::MAX).map(|all| all.page).ok()
         };
         assert_eq!((page(10 + 220, false), page(10 + 221, false)), (Some(230), None));
         assert_eq!((page(20, true), page(21, true)), (Some(20), None));

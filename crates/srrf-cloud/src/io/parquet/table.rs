@@ -6,7 +6,6 @@ use arrow_array::RecordBatch;
 use bytes::Bytes;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReaderBuilder};
-use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 
 use super::super::{FormatError, ReadOptions};
@@ -105,10 +104,7 @@ impl Table {
             for group in self.metadata.metadata().row_groups() {
                 let Some(column) = group.columns().get(leaf) else { continue };
                 let packing = column.compression();
-                if !matches!(packing, Compression::UNCOMPRESSED | Compression::SNAPPY | Compression::ZSTD(_))
-                {
-                    let name = format!("{packing:?}");
-                    let packing = name.split('(').next().unwrap_or_default();
+                if !pages::is_known(packing) {
                     return Err(content(format!(
                         "its columns are packed by {packing}; save it with compression \"snappy\", which pandas and pyarrow take \
                          by themselves, or \"zstd\""
@@ -119,7 +115,7 @@ impl Table {
                 let [begin, length] =
                     [begin, column.compressed_size()].map(|number| u64::try_from(number).unwrap_or(u64::MAX));
                 let end = begin.saturating_add(length);
-                let pages = pages::pages(&self.bytes, begin, end, packing)?;
+                let pages = pages::pages(&self.bytes, begin, end, packing, most)?;
                 values = values.saturating_add(pages.values);
                 largest = largest.max(pages.page);
             }

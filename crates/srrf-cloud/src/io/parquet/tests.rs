@@ -7,7 +7,7 @@ use arrow_array::{
 use arrow_schema::Field;
 use nalgebra::Rotation3;
 use parquet::arrow::ArrowWriter;
-use parquet::basic::{Compression, ZstdLevel};
+use parquet::basic::{BrotliLevel, Compression, GzipLevel, ZstdLevel};
 use parquet::file::properties::WriterProperties;
 
 use super::*;
@@ -44,9 +44,15 @@ fn numbers_of_every_kind() {
     let mut decimals = Decimal128Builder::new().with_precision_and_scale(20, 2).unwrap();
     decimals.append_value(-200);
     decimals.append_value(500);
-    for compression in
-        [Compression::SNAPPY, Compression::UNCOMPRESSED, Compression::ZSTD(ZstdLevel::default())]
-    {
+    for compression in [
+        Compression::SNAPPY,
+        Compression::UNCOMPRESSED,
+        Compression::ZSTD(ZstdLevel::default()),
+        Compression::GZIP(GzipLevel::default()),
+        Compression::BROTLI(BrotliLevel::default()),
+        Compression::LZ4,
+        Compression::LZ4_RAW,
+    ] {
         let names: ArrayRef = Arc::new(StringArray::from(vec!["a", "b"]));
         let bytes = packed(
             vec![

@@ -23,7 +23,7 @@ use crate::Rigid;
 pub(super) struct Vtk;
 
 /// XML files of VTK: PolyData, UnstructuredGrid and StructuredGrid, arrays as text, in base64 and behind
-/// the XML, packed by zlib or not. Written with a cell for each point, and attributes as arrays. A moved copy
+/// the XML, packed by zlib, LZ4, LZMA or not at all. Written with a cell for each point, and attributes as arrays. A moved copy
 /// has points and normals as text; all else stays.
 pub(super) struct VtkXml {
     kind: XmlKind,

@@ -132,16 +132,14 @@ pub(super) fn read(bytes: &[u8], options: &ReadOptions, what: What) -> Result<Xm
         )));
     }
     let packer = root.attribute("compressor").filter(|packer| !packer.is_empty());
-    let zipped = packer.is_some();
     let encoding = child(root, "AppendedData").and_then(|node| node.attribute("encoding"));
     let storage = Storage {
         big_endian: root.attribute("byte_order") == Some("BigEndian"),
         long: root.attribute("header_type") == Some("UInt64"),
-        zipped,
-        packer: packer.filter(|packer| *packer != "vtkZLibDataCompressor"),
+        packer,
         appended,
         appended_base64: encoding == Some("base64"),
-        budget: budget(bytes.len(), zipped),
+        budget: budget(bytes.len(), packer.is_some()),
         options,
         held: bytes.len(),
     };
