@@ -10,7 +10,7 @@ use srrf_cloud::{CloudError, KnnIndex, RegisterError, Solid};
 
 pub use cluster::VotedPose;
 use cluster::cluster;
-use feature::{Frame, KEYS, PairFeature};
+use feature::{KEYS, LocalFrame, PairFeature};
 use sample::OrientedSample;
 
 /// Settings of [`PpfModel`]. Lengths are shares of the part's diameter.
@@ -56,12 +56,12 @@ pub struct PpfModel {
     sample: OrientedSample,
     /// The entries of feature `k` are those from `begins[k]` to `begins[k + 1]`.
     begins: Vec<u32>,
-    entries: Vec<Entry>,
+    entries: Vec<PartPair>,
 }
 
 /// A pair of the part: its first point (twice its number, one more where the normal is turned over), and the turn about its normal.
 #[derive(Debug, Clone, Copy)]
-struct Entry {
+struct PartPair {
     point: u32,
     turn: f32,
 }
@@ -79,7 +79,7 @@ impl PpfModel {
         let mut keyed = Vec::new();
         for (i, (point, normal)) in sample.iter().enumerate() {
             for (side, normal) in [normal, -normal].into_iter().enumerate() {
-                let frame = Frame::at(&point, &normal);
+                let frame = LocalFrame::at(&point, &normal);
                 for (j, (other, other_normal)) in sample.iter().enumerate() {
                     if i == j {
                         continue;
@@ -88,7 +88,7 @@ impl PpfModel {
                         continue;
                     };
                     let Some(key) = feature.key(config.step * diameter) else { continue };
-                    let entry = Entry { point: (2 * i + side) as u32, turn: frame.turn(&other) as f32 };
+                    let entry = PartPair { point: (2 * i + side) as u32, turn: frame.turn(&other) as f32 };
                     keyed.push((key, entry));
                 }
             }
@@ -134,7 +134,7 @@ impl PpfModel {
     ) -> Vec<VotedPose> {
         votes.fill(0.0);
         let (point, normal) = scene.at(reference);
-        let frame = Frame::at(&point, &normal);
+        let frame = LocalFrame::at(&point, &normal);
         for (other, _) in index.within(&scene.points[reference], self.diameter, usize::MAX) {
             if other == reference {
                 continue;
@@ -156,7 +156,7 @@ impl PpfModel {
         let pose = |(votes, of, bin): (f32, usize, usize)| {
             let (model_point, model_normal) = self.sample.at(of / 2);
             let model_normal = if of % 2 == 0 { model_normal } else { -model_normal };
-            let model = Frame::at(&model_point, &model_normal);
+            let model = LocalFrame::at(&model_point, &model_normal);
             let turn = (bin as f64 + 0.5) / TURNS as f64 * std::f64::consts::TAU;
             VotedPose { target_from_source: frame.onto(&model, turn), votes: f64::from(votes) }
         };
@@ -165,7 +165,7 @@ impl PpfModel {
 }
 
 /// Entries in the order of their keys, after where those of each key begin.
-fn by_key(keyed: Vec<(usize, Entry)>) -> (Vec<u32>, Vec<Entry>) {
+fn by_key(keyed: Vec<(usize, PartPair)>) -> (Vec<u32>, Vec<PartPair>) {
     let mut begins = vec![0_u32; KEYS + 1];
     for (key, _) in &keyed {
         begins[key + 1] += 1;
@@ -174,7 +174,7 @@ fn by_key(keyed: Vec<(usize, Entry)>) -> (Vec<u32>, Vec<Entry>) {
         begins[key + 1] += begins[key];
     }
     let mut next = begins.clone();
-    let mut entries = vec![Entry { point: 0, turn: 0.0 }; keyed.len()];
+    let mut entries = vec![PartPair { point: 0, turn: 0.0 }; keyed.len()];
     for (key, entry) in keyed {
         entries[next[key] as usize] = entry;
         next[key] += 1;

@@ -1,4 +1,4 @@
-//! [`PairFeature`]: what two oriented points are to each other, whatever the motion. [`Frame`]: where the first of them stands.
+//! [`PairFeature`]: what two oriented points are to each other, whatever the motion. [`LocalFrame`]: where the first of them stands.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -53,13 +53,13 @@ impl PairFeature {
 
 /// An oriented point as a frame of its own, whose x axis is the normal.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Frame {
+pub(super) struct LocalFrame {
     origin: Vector3<f64>,
     /// Own from outer.
     rotation: Matrix3<f64>,
 }
 
-impl Frame {
+impl LocalFrame {
     pub fn at(point: &Vector3<f64>, normal: &Vector3<f64>) -> Self {
         let across = if normal.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
         let y = normal.cross(&across).normalize();
@@ -121,7 +121,7 @@ mod tests {
         for normal in [Vector3::new(0.9, 0.1, 0.2).normalize(), Vector3::new(0.1, -1.0, 0.3).normalize()] {
             let moved = |v: &Vector3<f64>| Vector3::from(pose.apply(&(*v).into()));
             let (part, scene) =
-                (Frame::at(&point, &normal), Frame::at(&moved(&point), &(pose.rotation * normal)));
+                (LocalFrame::at(&point, &normal), LocalFrame::at(&moved(&point), &(pose.rotation * normal)));
             let turn = scene.turn(&moved(&other)) - part.turn(&other);
             let found = scene.onto(&part, turn);
             assert!(found.angle_to_deg(&pose) < 1e-5 && (found.translation - pose.translation).norm() < 1e-9);
