@@ -28,17 +28,11 @@ LEAST_SEEN = 0.33
 WIDTH, HEIGHT = 320, 240
 
 
-def rotation(rng):
-    q = rng.normal(size=4)
-    return trimesh.transformations.quaternion_matrix(q / np.linalg.norm(q))[:3, :3]
-
-
 def placed(mesh, rng, at):
     """The mesh with a size of 1, turned, standing on the table at a place, and the pose that puts it there."""
     size = np.linalg.norm(mesh.extents)
     own = trimesh.Trimesh((mesh.vertices - mesh.bounds.mean(0)) / size, mesh.faces, process=False)
-    pose = np.eye(4)
-    pose[:3, :3] = rotation(rng)
+    pose = other_meshes.any_turn(rng)
     pose[:2, 3] = at
     pose[2, 3] = -(own.vertices @ pose[2, :3]).min()
     return own, pose
@@ -86,8 +80,8 @@ def scene(meshes, rng):
         if mine.sum() < 300 or mine.sum() < LEAST_SEEN * (alone == 0).sum():
             continue
         source = trimesh.sample.sample_surface(own, POINTS, seed=int(rng.integers(1 << 30)))[0]
-        turn = np.eye(4)  # the source's own frame: nothing of the pose is given away
-        turn[:3, :3], turn[:3, 3] = rotation(rng), rng.uniform(-1, 1, 3)
+        turn = other_meshes.any_turn(rng)  # the source's own frame: nothing of the pose is given away
+        turn[:3, 3] = rng.uniform(-1, 1, 3)
         source = source @ turn[:3, :3].T + turn[:3, 3]
         truth = pose @ np.linalg.inv(turn)
         yield "clutter", source, points[hit], truth
@@ -107,16 +101,13 @@ def main():
     arguments.out.mkdir(parents=True)
     rng = np.random.default_rng(arguments.seed)
     count = arguments.scenes * PARTS
-    shapes = other_meshes.meshes(arguments.meshes, arguments.wheels, None)
+    shapes = other_meshes.all_meshes(arguments.meshes, arguments.wheels)
     order = np.concatenate([rng.permutation(len(shapes)) for _ in range(-(-count // len(shapes)))])[:count]
     lines = ["name,source,target,pose,kind,voxel"]
     for number, some in enumerate(order.reshape(-1, PARTS)):
         for part, (kind, source, target, pose) in enumerate(scene([shapes[i] for i in some], rng)):
             name = f"{kind}-{number}-{part // 2}"
-            for side, points in (("x", source), ("y", target)):
-                scans.o3d.io.write_point_cloud(str(arguments.out / f"{name}{side}.ply"), scans.cloud(points))
-            np.savetxt(arguments.out / f"{name}.txt", pose)
-            lines.append(f"{name},{name}x.ply,{name}y.ply,{name}.txt,{kind},0.02")
+            lines.append(f"{name},{other_meshes.write_clouds(arguments.out, name, source, target, pose)},{kind},0.02")
     (arguments.out / "pairs.csv").write_text("\n".join(lines) + "\n")
     print(f"{len(lines) - 1} pairs in {arguments.out / 'pairs.csv'}")
 

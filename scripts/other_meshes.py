@@ -42,8 +42,8 @@ ICP = 2.0  # voxels
 ENDINGS = {".stl", ".obj", ".ply", ".off"}
 
 
-def meshes(folder, wheels, count):
-    """`count` meshes (all where none is said) with some depth, no two of the same proportions, spread over the folder."""
+def all_meshes(folder, wheels):
+    """The meshes of the folder that have some depth, no two of the same proportions."""
     if not folder.exists() or not any(p.suffix.lower() in ENDINGS for p in folder.rglob("*")):
         folder.mkdir(parents=True, exist_ok=True)
         command = [sys.executable, "-m", "pip", "download", "--no-deps", "--quiet", "--dest", folder, *wheels]
@@ -65,10 +65,29 @@ def meshes(folder, wheels, count):
             continue
         seen.add(key)
         found.append(mesh)
-    count = len(found) if count is None else count
+    return found
+
+
+def meshes(folder, wheels, count):
+    """`count` of them, spread over the folder."""
+    found = all_meshes(folder, wheels)
     if len(found) < count:
         sys.exit(f"{folder} holds {len(found)} meshes that can be used, and --meshes asks for {count}")
     return [found[i] for i in np.linspace(0, len(found) - 1, count).astype(int)]
+
+
+def any_turn(rng):
+    """A rotation by chance, 4 x 4."""
+    q = rng.normal(size=4)
+    return trimesh.transformations.quaternion_matrix(q / np.linalg.norm(q))
+
+
+def write_clouds(folder, name, source, target, pose):
+    """Files of one pair, and how a table begins that names them: source, target, pose."""
+    for side, points in (("x", source), ("y", target)):
+        scans.o3d.io.write_point_cloud(str(folder / f"{name}{side}.ply"), scans.cloud(points))
+    np.savetxt(folder / f"{name}.txt", pose)
+    return f"{name}x.ply,{name}y.ply,{name}.txt"
 
 
 class Rows:
@@ -138,8 +157,7 @@ class Rows:
         size = np.linalg.norm(frame - centre, axis=1).max()
         self.camera = self.unit()
         source, target = (work((draw(6000) - centre) / size) for _ in range(2))
-        q = self.rng.normal(size=4)
-        pose = trimesh.transformations.quaternion_matrix(q / np.linalg.norm(q))
+        pose = any_turn(self.rng)
         pose[:3, 3] = self.rng.uniform(-0.5, 0.5, 3)
         return source, target @ pose[:3, :3].T + pose[:3, 3], pose
 
@@ -149,10 +167,7 @@ def write(folder, pairs, meshes):
     folder.mkdir(parents=True)
     lines = ["name,source,target,pose,kind"]
     for i, (name, source, target, pose) in enumerate(pairs):
-        for which, points in (("x", source), ("y", target)):
-            scans.o3d.io.write_point_cloud(str(folder / f"{i}{which}.ply"), scans.cloud(points))
-        np.savetxt(folder / f"{i}.txt", pose)
-        lines.append(f"mesh{i % meshes} {name},{i}x.ply,{i}y.ply,{i}.txt,mesh: {name}")
+        lines.append(f"mesh{i % meshes} {name},{write_clouds(folder, i, source, target, pose)},mesh: {name}")
     (folder / "pairs.csv").write_text("\n".join(lines) + "\n")
     print(f"{len(pairs)} pairs in {folder / 'pairs.csv'}")
 

@@ -53,6 +53,8 @@ const MODEL_POINTS: usize = 1500;
 pub struct PpfModel {
     config: PpfConfig,
     diameter: f64,
+    /// The step of the settings, in the unit of the points.
+    step: f64,
     sample: OrientedSample,
     /// The entries of feature `k` are those from `begins[k]` to `begins[k + 1]`.
     begins: Vec<u32>,
@@ -70,13 +72,15 @@ impl PpfModel {
     /// Makes a part ready: `part` is its surface, all of it or what is known.
     ///
     /// # Errors
-    /// [`CloudError`] where fewer than 3 points are left after thinning.
+    /// Those of [`KnnIndex::new`], of which solid clouds have none.
     pub fn new(part: Solid<'_>, config: PpfConfig) -> Result<Self, CloudError> {
         let centre = part.middle();
         let far = |p: &[f64; 3]| (Vector3::from(*p) - centre).norm();
         let diameter = 2.0 * part.points().iter().map(far).fold(0.0, f64::max);
-        let sample = OrientedSample::new(&part, config.step * diameter, MODEL_POINTS)?;
-        let mut keyed = Vec::new();
+        let step = config.step * diameter;
+        let sample = OrientedSample::new(&part, step, MODEL_POINTS)?;
+        let count = sample.cloud.len();
+        let mut keyed = Vec::with_capacity(2 * count * (count - 1));
         for (i, (point, normal)) in sample.iter().enumerate() {
             for (side, normal) in [normal, -normal].into_iter().enumerate() {
                 let frame = LocalFrame::at(&point, &normal);
@@ -84,17 +88,15 @@ impl PpfModel {
                     if i == j {
                         continue;
                     }
-                    let Some(feature) = PairFeature::of(&point, &normal, &other, &other_normal) else {
-                        continue;
-                    };
-                    let Some(key) = feature.key(config.step * diameter) else { continue };
+                    let feature = PairFeature::of(&point, &normal, &other, &other_normal);
+                    let Some(key) = feature.and_then(|feature| feature.key(step)) else { continue };
                     let entry = PartPair { point: (2 * i + side) as u32, turn: frame.turn(&other) as f32 };
-                    keyed.push((key, entry));
+                    keyed.push((key as u32, entry));
                 }
             }
         }
         let (begins, entries) = by_key(keyed);
-        Ok(Self { config, diameter, sample, begins, entries })
+        Ok(Self { config, diameter, step, sample, begins, entries })
     }
 
     /// Twice the distance of the part's farthest point from its middle.
@@ -105,23 +107,22 @@ impl PpfModel {
     /// Where the part may be in `scene`: `scene ~ R part + t`, most votes first.
     ///
     /// # Errors
-    /// [`RegisterError::Target`] where fewer than 3 points of the scene are left after thinning.
+    /// Those of [`KnnIndex::new`] as [`RegisterError::Target`], of which solid clouds have none.
     pub fn poses(&self, scene: Solid<'_>) -> Result<Vec<VotedPose>, RegisterError> {
-        let step = self.config.step * self.diameter;
-        let sample =
-            OrientedSample::new(&scene, step, self.config.scene_points).map_err(RegisterError::Target)?;
-        let index = KnnIndex::new(&sample.points).map_err(RegisterError::Target)?;
-        let stride = sample.points.len().div_ceil(self.config.references.max(1));
-        let references: Vec<usize> = (0..sample.points.len()).step_by(stride).collect();
+        let sample = OrientedSample::new(&scene, self.step, self.config.scene_points)
+            .map_err(RegisterError::Target)?;
+        let index = KnnIndex::new(sample.cloud.points()).map_err(RegisterError::Target)?;
+        let stride = sample.cloud.len().div_ceil(self.config.references.max(1));
+        let references: Vec<usize> = (0..sample.cloud.len()).step_by(stride).collect();
         let found: Vec<Vec<VotedPose>> = references
             .par_iter()
             .map_init(
-                || vec![0.0_f32; 2 * self.sample.points.len() * TURNS],
+                || vec![0.0_f32; 2 * self.sample.cloud.len() * TURNS],
                 |votes, &reference| self.vote(&sample, &index, reference, votes),
             )
             .collect();
-        let centre = self.sample.centre();
-        Ok(cluster(found.concat(), centre, self.diameter, self.config.keep))
+        let centre = self.sample.cloud.centroid();
+        Ok(cluster(found.concat(), centre.into(), self.diameter, self.config.keep))
     }
 
     /// The poses that one point of the scene votes for.
@@ -135,13 +136,13 @@ impl PpfModel {
         votes.fill(0.0);
         let (point, normal) = scene.at(reference);
         let frame = LocalFrame::at(&point, &normal);
-        for (other, _) in index.within(&scene.points[reference], self.diameter, usize::MAX) {
+        for (other, _) in index.within(&point.into(), self.diameter, usize::MAX) {
             if other == reference {
                 continue;
             }
             let (second, second_normal) = scene.at(other);
-            let Some(feature) = PairFeature::of(&point, &normal, &second, &second_normal) else { continue };
-            let Some(key) = feature.key(self.config.step * self.diameter) else { continue };
+            let feature = PairFeature::of(&point, &normal, &second, &second_normal);
+            let Some(key) = feature.and_then(|feature| feature.key(self.step)) else { continue };
             let alike = &self.entries[self.begins[key] as usize..self.begins[key + 1] as usize];
             if alike.is_empty() {
                 continue;
@@ -165,10 +166,10 @@ impl PpfModel {
 }
 
 /// Entries in the order of their keys, after where those of each key begin.
-fn by_key(keyed: Vec<(usize, PartPair)>) -> (Vec<u32>, Vec<PartPair>) {
+fn by_key(keyed: Vec<(u32, PartPair)>) -> (Vec<u32>, Vec<PartPair>) {
     let mut begins = vec![0_u32; KEYS + 1];
     for (key, _) in &keyed {
-        begins[key + 1] += 1;
+        begins[*key as usize + 1] += 1;
     }
     for key in 0..KEYS {
         begins[key + 1] += begins[key];
@@ -176,8 +177,9 @@ fn by_key(keyed: Vec<(usize, PartPair)>) -> (Vec<u32>, Vec<PartPair>) {
     let mut next = begins.clone();
     let mut entries = vec![PartPair { point: 0, turn: 0.0 }; keyed.len()];
     for (key, entry) in keyed {
-        entries[next[key] as usize] = entry;
-        next[key] += 1;
+        let place = &mut next[key as usize];
+        entries[*place as usize] = entry;
+        *place += 1;
     }
     (begins, entries)
 }

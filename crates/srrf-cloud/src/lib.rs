@@ -42,5 +42,5 @@ pub use solid::Solid;
 pub use triangles::Triangles;
 pub use unit::{LengthUnit, UnitError};
 pub use voxel::{
-    VoxelError, coarsen, point_spacing, spacing_of, thin_to, voxel_downsample, voxel_downsample_to,
+    VoxelError, coarsen, point_spacing, spacing_of, thin_from, thin_to, voxel_downsample, voxel_downsample_to,
 };

@@ -136,13 +136,18 @@ pub fn thin_to(cloud: &PointCloud, most: usize, radius: f64) -> PointCloud {
         return cloud.clone();
     }
     // A surface of this radius has about 4 pi (radius / size)^2 voxels.
-    let first = radius * (4.0 / most as f64).sqrt();
+    thin_from(cloud, most, radius * (4.0 / most as f64).sqrt(), 1.25).1
+}
+
+/// The centroids of the first of the voxels of side `first`, `first * growth`, ... that leave at most `most` points, after that side.
+///
+/// Where lengths cannot be computed from the coordinates (beyond 1e150, say), it is the cloud itself, after `first`.
+pub fn thin_from(cloud: &PointCloud, most: usize, first: f64, growth: f64) -> (f64, PointCloud) {
     let thin = |size| match voxel_downsample_to(cloud, size, most) {
-        Ok(thin) => Ok(thin),
         Err(VoxelError::TooFine { .. }) => Ok(None),
-        Err(no_length) => Err(no_length),
+        other => other,
     };
-    coarsen(first, 1.25, thin).map_or_else(|_| cloud.clone(), |(_, thin)| thin)
+    coarsen(first, growth, thin).unwrap_or_else(|_| (first, cloud.clone()))
 }
 
 /// The first of the sizes `first`, `first * growth`, ... for which `thin` has an answer, and the answer.

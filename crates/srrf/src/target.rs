@@ -4,9 +4,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use srrf_classical::FpfhCloud;
-use srrf_cloud::{
-    CentredCloud, CloudError, PairFrame, PointCloud, Rigid, Solid, VoxelError, coarsen, voxel_downsample_to,
-};
+use srrf_cloud::{CentredCloud, CloudError, PairFrame, PointCloud, Rigid, Solid, thin_from};
 use srrf_refine::{RefineSource, RefineTarget};
 
 use crate::error::Error;
@@ -91,11 +89,7 @@ impl PreparedCloud {
 /// surface: scans are dense near the scanner.
 fn base(cloud: &PointCloud, radius: f64) -> PointCloud {
     let first = radius * (4.0 / MOST_POINTS as f64).sqrt() / 8.0;
-    let thin = |size| match voxel_downsample_to(cloud, size, MOST_POINTS) {
-        Err(VoxelError::TooFine { .. }) => Ok(None),
-        other => other,
-    };
-    coarsen(first, 2.0, thin).map_or_else(|_| cloud.clone(), |(_, thinned)| thinned)
+    thin_from(cloud, MOST_POINTS, first, 2.0).1
 }
 
 /// Root mean square distance of the points from their mean.

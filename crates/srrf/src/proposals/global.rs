@@ -4,8 +4,9 @@
 use std::sync::Arc;
 
 use srrf_classical::{FpfhRansac, FpfhRansacConfig};
-use srrf_cloud::{RegisterError, Rigid};
+use srrf_cloud::RegisterError;
 
+use super::range::in_range;
 use super::{Proposal, Proposals, Proposed, Round};
 use crate::network::LazyNetwork;
 use crate::options::{Method, Options, RotationRange};
@@ -27,9 +28,6 @@ const FINE_POINTS: usize = 8000;
 /// Radii of the features that are tried where there is doubt, in voxels, beside the default one: on crops and uneven clouds each
 /// finds poses that the others miss.
 const WIDE_RADII: [f64; 2] = [8.0, 12.0];
-/// With [`RotationRange::Within45`], poses that are turned by more than this against the first guess are no starts: 45 degrees
-/// about each of three axes come to 86 at most.
-const WITHIN_DEG: f64 = 90.0;
 
 /// What looks for poses in the matches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -179,47 +177,11 @@ impl Global {
             Estimator::Ransac => method.hypotheses(source, target)?,
             Estimator::Graph | Estimator::FineGraph => method.graph_hypotheses(source, target)?,
         };
-        let poses = match self.rotation {
-            RotationRange::Any => found.poses,
-            RotationRange::Within45 => within(found.poses, &pair.initial)?,
-        };
+        let poses = in_range(self.rotation, found.poses, &pair.initial)?;
         let start = match by {
             Estimator::Ransac => Start::FpfhRansac { feature_voxels },
             Estimator::Graph | Estimator::FineGraph => Start::FpfhGraph { feature_voxels },
         };
         Ok(poses.into_iter().map(|pose| Proposal { start, pose }).collect())
-    }
-}
-
-/// The poses that are turned by at most [`WITHIN_DEG`] against the first guess.
-pub(super) fn within(poses: Vec<Rigid>, given: &Rigid) -> Result<Vec<Rigid>, RegisterError> {
-    let count = poses.len();
-    let kept: Vec<Rigid> = poses.into_iter().filter(|p| p.angle_to_deg(given) <= WITHIN_DEG).collect();
-    if kept.is_empty() {
-        return Err(RegisterError::NoPose(format!(
-            "each of {count} poses is turned by more than {WITHIN_DEG} degrees against the given one; the rotation range \
-             45 excludes them, 180 does not"
-        ).into()));
-    }
-    Ok(kept)
-}
-
-#[cfg(test)]
-mod tests {
-    use srrf_cloud::EulerXyz;
-
-    use super::*;
-
-    #[test]
-    fn poses_beyond_the_range_are_left_out_and_none_left_is_an_error() {
-        let about_z = |degrees| Rigid {
-            rotation: EulerXyz::from_deg([0.0, 0.0, degrees]).to_matrix(),
-            ..Rigid::identity()
-        };
-        let given = about_z(30.0);
-        let poses = vec![about_z(160.0), about_z(119.0), about_z(-59.0), about_z(-61.0)];
-        assert_eq!(within(poses, &given).unwrap(), [about_z(119.0), about_z(-59.0)]);
-        let said = within(vec![about_z(160.0), about_z(-61.0)], &given).unwrap_err().to_string();
-        assert!(said.contains("each of 2 poses") && said.contains("180"), "{said}");
     }
 }

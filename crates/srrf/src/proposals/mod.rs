@@ -8,6 +8,7 @@ mod global;
 mod icp;
 mod network;
 mod parts;
+mod range;
 
 use std::fmt;
 use std::sync::Arc;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use srrf_classical::{PpfConfig, PpfModel};
 use srrf_cloud::RegisterError;
 
+use super::range::in_range;
 use super::{Proposal, Proposals, Proposed, Round};
 use crate::network::LazyNetwork;
 use crate::options::{Method, Options, RotationRange};
@@ -51,10 +52,7 @@ impl PointPairs {
             .into_iter()
             .map(|p| p.target_from_source)
             .collect();
-        let poses = match self.rotation {
-            RotationRange::Any => poses,
-            RotationRange::Within45 => super::global::within(poses, &pair.initial)?,
-        };
+        let poses = in_range(self.rotation, poses, &pair.initial)?;
         Ok(poses.into_iter().map(|pose| Proposal { start: Start::PointPairs, pose }).collect())
     }
 }
